@@ -1,0 +1,85 @@
+"""What can go wrong, told to people.
+
+Every failure that a user can cause or mend is a `BrrpError`. It says what went wrong, where, what
+was expected, what was found and how to mend it. Commands print it as one message without a
+traceback; any other exception that reaches the user is a bug of ours.
+"""
+
+from __future__ import annotations
+
+
+class BrrpError(Exception):
+    """A failure with a message for people.
+
+    Parameters
+    ----------
+    what : one sentence, without a full stop
+    where : file, and key, row or id in it
+    expected, found : what the code needs and what it met
+    fix : what the user can do about it
+    """
+
+    exit_code = 1
+
+    def __init__(
+        self,
+        what: str,
+        *,
+        where: object = None,
+        expected: object = None,
+        found: object = None,
+        fix: str | None = None,
+    ) -> None:
+        self.what = what
+        self.where = where
+        self.expected = expected
+        self.found = found
+        self.fix = fix
+        super().__init__(str(self))
+
+    def __str__(self) -> str:
+        lines = [self.what]
+        for label in ("where", "expected", "found", "fix"):
+            value = getattr(self, label)
+            if value is not None:
+                lines.append(f"  {label + ':':<10}{value}")
+        return "\n".join(lines)
+
+    def __reduce__(self) -> tuple[object, ...]:
+        # Exceptions cross process borders (workers); keyword-only arguments need help to do so.
+        return (_rebuild, (type(self), self.what, self.where, self.expected, self.found, self.fix))
+
+
+def _rebuild(
+    kind: type[BrrpError],
+    what: str,
+    where: object,
+    expected: object,
+    found: object,
+    fix: str | None,
+) -> BrrpError:
+    return kind(what, where=where, expected=expected, found=found, fix=fix)
+
+
+class FrameError(BrrpError):
+    """A frame, or what is to become one, cannot be used."""
+
+
+class MeshError(BrrpError):
+    """A mesh cannot become an object of the prior."""
+
+
+class PriorError(BrrpError):
+    """A prior is missing, damaged, or does not fit what is asked of it."""
+
+
+class RetrievalError(BrrpError):
+    """Retrieval cannot run: a model is missing or not the right one."""
+
+
+class OutputError(BrrpError):
+    """Results cannot be written."""
+
+
+class DependencyError(BrrpError):
+    """A library is missing or does not load."""

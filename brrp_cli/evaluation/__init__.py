@@ -1,0 +1,1 @@
+"""Evaluation: metrics against known truth."""

@@ -1,0 +1,1 @@
+"""Frames: what a camera saw, checked, and what is sampled from it."""

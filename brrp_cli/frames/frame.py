@@ -1,0 +1,82 @@
+"""One segmented RGBD frame, checked."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brrp_cli.errors import FrameError
+
+BACKGROUND = 0
+
+
+@dataclass(frozen=True)
+class Frame:
+    """What the camera saw and which pixel belongs to which object.
+
+    Attributes
+    ----------
+    rgb : (H, W, 3) uint8
+    points : (H, W, 3) float32, metres, camera frame (x right, y down, z forward); NaN = no return
+    segmap : (H, W) int64, object ids; 0 = background
+    K : (3, 3) float64, pinhole intrinsics, pixels
+    T_world_cam : (4, 4) float64 or None, camera frame to world frame
+    source : the file or folder it came from, for messages
+
+    The arrays are read-only copies: nothing downstream can change what the caller handed in.
+    """
+
+    rgb: NDArray[np.uint8]
+    points: NDArray[np.float32]
+    segmap: NDArray[np.int64]
+    K: NDArray[np.float64]
+    T_world_cam: NDArray[np.float64] | None = None
+    source: Path | None = field(default=None, compare=False)
+
+    def __post_init__(self) -> None:
+        height, width = self.segmap.shape
+        for name, shape in {
+            "rgb": (height, width, 3),
+            "points": (height, width, 3),
+            "K": (3, 3),
+            "T_world_cam": (4, 4),
+        }.items():
+            value = getattr(self, name)
+            if value is not None and value.shape != shape:
+                raise FrameError(
+                    f"The frame's {name} has the wrong shape",
+                    where=self.source,
+                    expected=shape,
+                    found=value.shape,
+                    fix="colour, depth and masks must come from one camera at one resolution",
+                )
+        for name in ("rgb", "points", "segmap", "K", "T_world_cam"):
+            value = getattr(self, name)
+            if value is not None:
+                value = value.copy()
+                value.setflags(write=False)
+                object.__setattr__(self, name, value)
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """(H, W)."""
+        height, width = self.segmap.shape
+        return height, width
+
+    @cached_property
+    def valid(self) -> NDArray[np.bool_]:
+        """(H, W) bool: pixels with a depth return."""
+        return np.isfinite(self.points).all(axis=-1) & (self.points[..., 2] > 0)
+
+    @cached_property
+    def object_ids(self) -> list[int]:
+        """Ids in the mask, ascending, without the background."""
+        return [int(i) for i in np.unique(self.segmap) if i != BACKGROUND]
+
+    def object_points(self, object_id: int) -> NDArray[np.float32]:
+        """(n, 3) valid points of one object, metres, camera frame."""
+        return self.points[self.valid & (self.segmap == object_id)]

@@ -1,0 +1,55 @@
+"""Transforms and the pinhole camera.
+
+Transforms are named `T_target_source` and are (4, 4) matrices on column vectors. The camera frame
+is x right, y down, z forward (ROS optical frame); pixel (u, v) is column u, row v.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.floating]
+
+
+def transform_points(T_target_source: Array, points: Array) -> Array:
+    """Points (..., 3) in the source frame, given in the target frame."""
+    return points @ T_target_source[:3, :3].T + T_target_source[:3, 3]
+
+
+def similarity(
+    scale: float = 1.0, rotation: Array | None = None, translation: Array | None = None
+) -> NDArray[np.float64]:
+    """(4, 4) matrix of x -> scale * rotation @ x + translation."""
+    T = np.eye(4)
+    T[:3, :3] *= scale
+    if rotation is not None:
+        T[:3, :3] = scale * np.asarray(rotation, dtype=np.float64)
+    if translation is not None:
+        T[:3, 3] = translation
+    return T
+
+
+def backproject(depth: Array, K: Array) -> NDArray[np.float32]:
+    """Depth (H, W), metres along z, to points (H, W, 3), metres, camera frame.
+
+    Pixels without depth (0, negative, NaN or inf) become NaN.
+    """
+    height, width = depth.shape
+    z = np.where(np.isfinite(depth) & (depth > 0), depth, np.nan).astype(np.float64)
+    u, v = np.meshgrid(np.arange(width), np.arange(height))
+    x = (u - K[0, 2]) / K[0, 0] * z
+    y = (v - K[1, 2]) / K[1, 1] * z
+    return np.stack([x, y, z], axis=-1).astype(np.float32)
+
+
+def project(points: Array, K: Array) -> NDArray[np.float64]:
+    """Points (n, 3), camera frame, to pixels (n, 2) as (u, v)."""
+    z = points[:, 2:3]
+    return points[:, :2] / z * np.array([K[0, 0], K[1, 1]]) + np.array([K[0, 2], K[1, 2]])
+
+
+def normalise(vectors: Array) -> NDArray[np.float64]:
+    """Unit vectors along `vectors` (..., 3); zero vectors stay zero."""
+    length = np.linalg.norm(vectors, axis=-1, keepdims=True)
+    return np.asarray(vectors / np.where(length > 0, length, 1.0), dtype=np.float64)

@@ -1,0 +1,1 @@
+"""The prior, offline: from meshes to shards and a manifest."""

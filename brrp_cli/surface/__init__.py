@@ -1,0 +1,1 @@
+"""Surfaces: meshes, pictures and files of a reconstruction."""
