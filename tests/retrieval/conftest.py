@@ -1,0 +1,31 @@
+from pathlib import Path
+
+import numpy as np
+import pytest
+from small_clip import RGB, write_immich, write_xenova
+
+from brrp_cli.frames.frame import Frame
+
+
+@pytest.fixture(scope="session")
+def xenova(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return write_xenova(tmp_path_factory.mktemp("xenova"))
+
+
+@pytest.fixture(scope="session")
+def immich(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return write_immich(tmp_path_factory.mktemp("immich"))
+
+
+@pytest.fixture
+def coloured_frame() -> Frame:
+    """Objects 7 (red), 250 (green) and 3 (blue) on grey."""
+    rgb = np.full((60, 80, 3), 127, dtype=np.uint8)
+    segmap = np.zeros((60, 80), dtype=np.int64)
+    boxes = {"red": (7, 10, 5), "green": (250, 40, 20), "blue": (3, 30, 55)}
+    for colour, (object_id, row, column) in boxes.items():
+        rgb[row : row + 12, column : column + 20] = RGB[colour]
+        segmap[row : row + 12, column : column + 20] = object_id
+    return Frame(
+        rgb=rgb, points=np.ones((60, 80, 3), np.float32), segmap=segmap, K=np.eye(3, dtype=float)
+    )
