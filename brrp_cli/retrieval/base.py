@@ -1,0 +1,44 @@
+"""What every retriever is: P(c|R), the probability of each stored object given the image.
+
+The paper uses CLIP for it (section IV-B); anything that can score the prior's objects against what
+is seen of one object can stand in.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brrp_cli.frames.frame import Frame
+
+
+class Retriever(Protocol):
+    """Gives P(c|R) over the objects of one prior. `name` is written beside the results."""
+
+    @property
+    def name(self) -> str:
+        """Short name, such as `clip`."""
+
+    def probabilities(self, frame: Frame, object_id: int) -> NDArray[np.float64]:
+        """P(c|R) (n,) for one object of the frame, in the order of the prior's names, sum 1."""
+
+
+def softmax(scores: NDArray[np.floating]) -> NDArray[np.float64]:
+    """exp(scores) / sum exp(scores) for scores (n,), finite or -inf, at least one finite."""
+    weights = np.exp(np.asarray(scores, dtype=np.float64) - np.max(scores))
+    return np.asarray(weights / weights.sum(), dtype=np.float64)
+
+
+def top_k(
+    probabilities: NDArray[np.floating], names: Sequence[str], k: int
+) -> list[tuple[str, float]]:
+    """The k most probable objects, most probable first, as (name, probability).
+
+    Equal probabilities go in the order of names, so that the choice never hangs on the sorting
+    routine. A k beyond the prior's size gives all of its objects.
+    """
+    ranked = sorted(zip(names, map(float, probabilities), strict=True), key=lambda t: (-t[1], t[0]))
+    return ranked[:k]

@@ -1,0 +1,27 @@
+import numpy as np
+import pytest
+
+from brrp_cli.retrieval.base import softmax, top_k
+
+
+def test_softmax_of_known_odds() -> None:
+    assert np.allclose(softmax(np.log([1.0, 2.0, 5.0])), [0.125, 0.25, 0.625])
+
+
+def test_softmax_of_large_scores_does_not_overflow() -> None:
+    assert np.allclose(softmax(np.array([1e5, 1e5, -np.inf])), [0.5, 0.5, 0])
+
+
+def test_top_k_orders_by_probability_then_name() -> None:
+    names = ["cup", "box", "can", "ant"]
+    found = top_k(np.array([0.2, 0.2, 0.5, 0.1]), names, 3)
+    assert found == [("can", 0.5), ("box", 0.2), ("cup", 0.2)]
+
+
+def test_top_k_beyond_the_prior_gives_all_of_it() -> None:
+    assert [name for name, _ in top_k(np.array([0.4, 0.6]), ["a", "b"], 10)] == ["b", "a"]
+
+
+def test_top_k_refuses_probabilities_of_another_prior() -> None:
+    with pytest.raises(ValueError):
+        top_k(np.array([1.0]), ["a", "b"], 1)
