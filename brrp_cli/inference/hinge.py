@@ -36,7 +36,7 @@ class HingeGrid:
 
 
 def axis_factors(coordinates: Tensor, grid: HingeGrid) -> Tensor:
-    """One-dimensional kernels (..., per_axis) of coordinates (...), metres from the grid's centre."""
+    """Kernels along one axis (..., per_axis) of coordinates (...), metres from the centre."""
     hinges = torch.linspace(
         -grid.half_width,
         grid.half_width,

@@ -20,6 +20,7 @@ from brrp_cli.registration.scan import ObservedCloud, observed_cloud, register
 from brrp_cli.retrieval.base import Retriever, top_k
 from brrp_cli.seeds import child_seed
 
+
 def reconstruct_object(
     frame: Frame,
     observation: ObjectObservation,
@@ -103,4 +104,3 @@ def _timed(seconds: dict[str, float], stage: str) -> Iterator[None]:
     start = time.perf_counter()
     yield
     seconds[stage] = time.perf_counter() - start
-

@@ -65,8 +65,9 @@ def register(
 ) -> Placement | None:
     """Place a stored object at the scale of the scan with most inlier pairs.
 
-    scales : the members of the scan to try, all by default. Returns None when no scale has an
-    inlier. The first of equal scales wins.
+    scales : the members of the scan to try, all by default. Returns None when no scale has more
+    inliers than one draw has points: Open3D then returns the identity. The first of equal scales
+    wins.
     """
     best: Placement | None = None
     for scale in features.scales if scales is None else scales:
@@ -74,7 +75,7 @@ def register(
         T_center_source, inliers, fitness = _ransac(
             source, observed.cloud, config, child_seed(seed, "ransac", stored.name, str(scale))
         )
-        if inliers > (best.inliers if best else 0):
+        if inliers > (best.inliers if best else config.draw):
             T_cam_center = similarity(translation=observed.center)
             T_source_object = similarity(scale=features.base_scale * scale)
             T_cam_object = T_cam_center @ T_center_source @ T_source_object

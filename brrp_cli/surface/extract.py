@@ -43,7 +43,7 @@ def extract_surface(
 def _near_observed(
     occupied: NDArray[np.bool_], observed: NDArray[np.floating], config: SurfaceConfig
 ) -> NDArray[np.bool_]:
-    """The connected parts of `occupied` within `keep_distance` of an observed point (n, 3), cells."""
+    """The connected parts of `occupied` that come near an observed point (n, 3), in cells."""
     from scipy.ndimage import distance_transform_edt
     from skimage.measure import label
 
