@@ -190,3 +190,10 @@ def test_points_far_from_the_scene_do_not_make_the_plane():
     table = np.column_stack([rng.uniform(-0.3, 0.3, (900, 2)), np.full(900, 2.0)])
     found = fit_plane(np.concatenate([floor, table]), CONFIG, 0, np.array([0, 0, 1.95]))
     assert found.offset == pytest.approx(2.0, abs=1e-6)
+
+
+def test_the_plane_does_not_depend_on_which_thread_is_first():
+    rng = np.random.default_rng(0)
+    plane = np.column_stack([rng.uniform(-0.4, 0.4, (3000, 2)), rng.normal(2.0, 0.006, 3000)])
+    found = [fit_plane(plane, CONFIG, 0, np.array([0, 0, 1.9])) for _ in range(20)]
+    assert len({(plane.normal.tobytes(), plane.offset) for plane in found}) == 1
