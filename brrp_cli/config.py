@@ -80,7 +80,7 @@ class SurfaceConfig:
     """Marching cubes on the mean occupancy."""
 
     level: float = 0.5
-    spacing: float = 0.004
+    spacing: float = 0.005
     # A component of the level set further than this from every observed point is hallucinated.
     keep_distance: float = 0.01
 

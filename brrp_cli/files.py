@@ -72,6 +72,25 @@ def write_bytes(path: Path, data: bytes) -> None:
         partial.write_bytes(data)
 
 
+def refuse_existing(path: Path, *, overwrite: bool) -> None:
+    """OutputError if `path` is there and may not be replaced."""
+    if path.exists() and not overwrite:
+        raise OutputError(
+            "The output exists already",
+            where=path,
+            fix="pass --overwrite to replace it, or choose another place with -o",
+        )
+
+
+def check_writable(folder: Path) -> None:
+    """OutputError if no file can be made in `folder`, which is made if it is missing."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        tempfile.TemporaryFile(dir=folder).close()
+    except OSError as error:
+        raise cannot_write(folder, error) from error
+
+
 @contextmanager
 def atomic_folder(folder: Path, *, overwrite: bool) -> Iterator[Path]:
     """Yield a temporary folder beside `folder`; on success it takes the place of `folder`.
@@ -83,12 +102,7 @@ def atomic_folder(folder: Path, *, overwrite: bool) -> Iterator[Path]:
         raise OutputError(
             "The output folder is a file", where=folder, fix="choose another folder with -o"
         )
-    if folder.exists() and not overwrite:
-        raise OutputError(
-            "The output folder exists already",
-            where=folder,
-            fix="pass --overwrite to replace it, or choose another folder with -o",
-        )
+    refuse_existing(folder, overwrite=overwrite)
     try:
         folder.parent.mkdir(parents=True, exist_ok=True)
         partial = Path(tempfile.mkdtemp(dir=folder.parent, prefix=f".{folder.name}.partial."))

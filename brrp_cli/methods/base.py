@@ -3,10 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    import trimesh
+
+Axes = tuple[NDArray[np.floating], NDArray[np.floating], NDArray[np.floating]]
 
 OK = "ok"
 TOO_FEW_POINTS = "too_few_points"
@@ -27,8 +32,30 @@ class OccupancyPosterior(Protocol):
     def probability(self, points: NDArray[np.floating]) -> NDArray[np.float32]:
         """Occupancy probability (n,) at points (n, 3), metres, camera frame."""
 
+    def probability_volume(self, axes: Axes) -> NDArray[np.float32]:
+        """Occupancy probability (nx, ny, nz) on a lattice of camera-frame coordinates, metres."""
+
     def uncertainty(self, points: NDArray[np.floating]) -> NDArray[np.float32]:
         """How unsure (n,), >= 0, in the method's own unit (BRRP: variance of the logits)."""
+
+
+@dataclass(frozen=True)
+class Surface:
+    """A closed, outward triangle mesh.
+
+    vertices : (n, 3) float64, metres, camera frame; faces : (m, 3) int64; uncertainty : (n,)
+    float32, the posterior's uncertainty at each vertex.
+    """
+
+    vertices: NDArray[np.float64]
+    faces: NDArray[np.int64]
+    uncertainty: NDArray[np.float32]
+
+    def as_trimesh(self) -> trimesh.Trimesh:
+        """The same as a trimesh, vertices in the same order."""
+        import trimesh
+
+        return trimesh.Trimesh(self.vertices, self.faces, process=False)
 
 
 @dataclass
@@ -50,7 +77,17 @@ class Retrieved:
 
 @dataclass
 class ObjectReconstruction:
-    """What is known of one object after inference. `posterior` is None unless status is "ok"."""
+    """What is known of one object after inference.
+
+    Attributes
+    ----------
+    status : "ok", or why there is no surface: "too_few_points", "no_surface", "failed"
+    message : for people; may also qualify an "ok"
+    n_points : valid observed points; observed : (n, 3) those points, metres, camera frame;
+    center : (3,) centre of their bounding box
+    posterior, surface : None unless the object got that far
+    seconds : time of each stage
+    """
 
     object_id: int
     status: str
@@ -60,5 +97,5 @@ class ObjectReconstruction:
     observed: NDArray[np.float32] | None = None
     retrieved: list[Retrieved] = field(default_factory=list)
     posterior: OccupancyPosterior | None = None
+    surface: Surface | None = None
     seconds: dict[str, float] = field(default_factory=dict)
-    extra: dict[str, Any] = field(default_factory=dict)

@@ -1,0 +1,44 @@
+"""brrp: from one segmented RGBD frame to a closed mesh of every object, and how sure that is.
+
+from brrp_cli import load_frame, open_prior, reconstruct
+result = reconstruct(load_frame("frame.npz"), open_prior("prior/"))
+"""
+
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING, Any
+
+from brrp_cli.version import __version__
+
+if TYPE_CHECKING:
+    from brrp_cli.api import Reconstruction as Reconstruction
+    from brrp_cli.api import reconstruct as reconstruct
+    from brrp_cli.config import preset as preset
+    from brrp_cli.errors import BrrpError as BrrpError
+    from brrp_cli.frames.build import make_frame as make_frame
+    from brrp_cli.frames.npz import load_frame as load_frame
+    from brrp_cli.inference.posterior_file import open_posterior as open_posterior
+    from brrp_cli.prior.store import open_prior as open_prior
+    from brrp_cli.surface.results import write_results as write_results
+
+# Names are imported when they are used, so that `brrp --help` does not wait for torch.
+_HOMES = {
+    "BrrpError": "brrp_cli.errors",
+    "Reconstruction": "brrp_cli.api",
+    "load_frame": "brrp_cli.frames.npz",
+    "make_frame": "brrp_cli.frames.build",
+    "open_posterior": "brrp_cli.inference.posterior_file",
+    "open_prior": "brrp_cli.prior.store",
+    "preset": "brrp_cli.config",
+    "reconstruct": "brrp_cli.api",
+    "write_results": "brrp_cli.surface.results",
+}
+
+__all__ = ["__version__", *_HOMES]
+
+
+def __getattr__(name: str) -> Any:
+    if name in _HOMES:
+        return getattr(importlib.import_module(_HOMES[name]), name)
+    raise AttributeError(f"module 'brrp_cli' has no attribute {name!r}")

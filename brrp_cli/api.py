@@ -1,0 +1,149 @@
+"""From a frame and a prior to every object's surface, in Python.
+
+from brrp_cli import load_frame, open_prior, reconstruct
+result = reconstruct(load_frame("frame.npz"), open_prior("prior/"))
+result.objects[0].surface.as_trimesh()
+"""
+
+from __future__ import annotations
+
+import logging
+import time
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from brrp_cli.config import Config, preset
+from brrp_cli.errors import BrrpError
+from brrp_cli.frames.frame import Frame
+from brrp_cli.frames.observe import ObjectObservation, observe
+from brrp_cli.frames.plane import Plane
+from brrp_cli.methods.base import FAILED, NO_SURFACE, OK, TOO_FEW_POINTS, ObjectReconstruction
+from brrp_cli.prior.store import Prior
+from brrp_cli.progress import progress
+
+if TYPE_CHECKING:
+    from brrp_cli.retrieval.base import Retriever
+
+log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True)
+class Reconstruction:
+    """Everything that is known of a frame's objects, and how it came about.
+
+    objects : one for each id in the mask, ascending; plane : the support plane, camera frame;
+    seconds : time of the stages that concern the whole frame.
+    """
+
+    frame: Frame
+    objects: list[ObjectReconstruction]
+    plane: Plane | None
+    method: str
+    retriever: str
+    prior_path: Path
+    prior_digest: str
+    config: Config
+    seed: int
+    device: str
+    seconds: dict[str, float] = field(default_factory=dict)
+
+    @property
+    def reconstructed(self) -> list[ObjectReconstruction]:
+        """The objects that have a surface."""
+        return [o for o in self.objects if o.surface is not None]
+
+
+def pick_device(device: str) -> str:
+    """`auto` is CUDA where there is one. Errors: BrrpError when CUDA is asked for in vain."""
+    import torch
+
+    if device == "auto":
+        return "cuda" if torch.cuda.is_available() else "cpu"
+    if device == "cuda" and not torch.cuda.is_available():
+        raise BrrpError(
+            "No CUDA device can be used",
+            expected="a GPU and a CUDA build of torch",
+            found=f"torch {torch.__version__}",
+            fix="pass --device cpu, or install a CUDA build of torch",
+        )
+    return device
+
+
+def reconstruct(
+    frame: Frame,
+    prior: Prior,
+    *,
+    config: Config | None = None,
+    retriever: Retriever | None = None,
+    seed: int = 0,
+    device: str = "auto",
+) -> Reconstruction:
+    """Reconstruct every object of a segmented frame with BRRP.
+
+    retriever : P(c|R); without one, CLIP if `BRRP_CLIP_DIR` is set and registration fitness
+    otherwise. An object that cannot be reconstructed gets a status; the others still are. The
+    frame is never changed. The same seed gives the same result.
+    """
+    from brrp_cli.methods.brrp import reconstruct_object
+    from brrp_cli.retrieval.choose import choose_retriever
+
+    config = config or preset("default")
+    device = pick_device(device)
+    seconds: dict[str, float] = {}
+    start = time.perf_counter()
+    retriever = retriever or choose_retriever("auto", prior, config, seed)
+    seconds["retriever"] = time.perf_counter() - start
+    start = time.perf_counter()
+    scene = observe(frame, config.observation, seed)
+    seconds["observation"] = time.perf_counter() - start
+
+    def one(observation: ObjectObservation) -> ObjectReconstruction:
+        return reconstruct_object(
+            frame, observation, prior, retriever, config, seed=seed, device=device
+        )
+
+    objects = []
+    for object_id in progress(frame.object_ids, "objects"):
+        if object_id in scene.too_few:
+            objects.append(_too_few(object_id, scene.too_few[object_id], config))
+            continue
+        try:
+            result = one(scene.objects[object_id])
+            _add_surface(result, config)
+        except BrrpError as error:
+            log.warning("Object %d: %s", object_id, error)
+            result = ObjectReconstruction(object_id, FAILED, str(error))
+        objects.append(result)
+    return Reconstruction(
+        frame=frame,
+        objects=objects,
+        plane=scene.plane,
+        method="brrp",
+        retriever=retriever.name,
+        prior_path=prior.path,
+        prior_digest=prior.digest,
+        config=config,
+        seed=seed,
+        device=device,
+        seconds=seconds,
+    )
+
+
+def _too_few(object_id: int, count: int, config: Config) -> ObjectReconstruction:
+    message = f"{count} valid depth points, {config.observation.min_points} are needed"
+    return ObjectReconstruction(object_id, TOO_FEW_POINTS, message, n_points=count)
+
+
+def _add_surface(result: ObjectReconstruction, config: Config) -> None:
+    """Extract the surface of an object that has a posterior."""
+    from brrp_cli.surface.extract import extract_surface
+
+    if result.status != OK or result.posterior is None or result.observed is None:
+        return
+    start = time.perf_counter()
+    result.surface = extract_surface(result.posterior, result.observed, config.surface)
+    result.seconds["surface"] = time.perf_counter() - start
+    if result.surface is None:
+        result.status = NO_SURFACE
+        result.message = "the map is occupied nowhere near the observed points"

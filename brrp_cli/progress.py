@@ -1,0 +1,26 @@
+"""Progress bars on stderr, silent with -q and where nobody looks."""
+
+from __future__ import annotations
+
+import logging
+import sys
+from collections.abc import Iterable, Sized
+from typing import TypeVar
+
+T = TypeVar("T")
+
+
+def quiet() -> bool:
+    """Whether `brrp -q` asked for errors only."""
+    return logging.getLogger().getEffectiveLevel() >= logging.ERROR
+
+
+def progress(items: Iterable[T], label: str, total: int | None = None) -> Iterable[T]:
+    """The same items, counted by a bar on stderr if that is a terminal."""
+    from tqdm import tqdm
+
+    if total is None and isinstance(items, Sized):
+        total = len(items)
+    disable = quiet() or not sys.stderr.isatty()
+    bar: Iterable[T] = tqdm(items, desc=label, total=total, file=sys.stderr, disable=disable)
+    return bar

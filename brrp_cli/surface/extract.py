@@ -1,0 +1,58 @@
+"""From a posterior to a closed mesh with uncertainty on its vertices."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brrp_cli.config import SurfaceConfig
+from brrp_cli.methods.base import Axes, OccupancyPosterior, Surface
+
+
+def lattice_axes(bounds: NDArray[np.floating], spacing: float) -> Axes:
+    """Coordinates along x, y and z of a lattice that fills a box (2, 3), metres."""
+    x, y, z = (np.arange(low, high + spacing / 2, spacing) for low, high in bounds.T)
+    return x, y, z
+
+
+def extract_surface(
+    posterior: OccupancyPosterior, observed: NDArray[np.floating], config: SurfaceConfig
+) -> Surface | None:
+    """Marching cubes at `config.level` on the mean occupancy, around what was observed.
+
+    observed : (n, 3) points of the object, metres, camera frame. Parts of the level set that no
+    observed point is near are dropped: where neither rays nor prior samples reach, the map keeps
+    the noise that the particles started from. Returns None when nothing is left.
+    """
+    from skimage.measure import marching_cubes
+
+    axes = lattice_axes(posterior.bounds, config.spacing)
+    volume = posterior.probability_volume(axes)
+    origin = np.array([axis[0] for axis in axes])
+    kept = _near_observed(volume >= config.level, (observed - origin) / config.spacing, config)
+    if not kept.any():
+        return None
+    # What was dropped must not leave a surface; a border of zeros closes what touches the bounds.
+    volume = np.where((volume >= config.level) & ~kept, 0.0, volume)
+    volume = np.pad(volume, 1)
+    vertices, faces, _, _ = marching_cubes(volume, config.level, gradient_direction="ascent")
+    vertices = (vertices.astype(np.float64) - 1) * config.spacing + origin
+    return Surface(vertices, faces.astype(np.int64), posterior.uncertainty(vertices))
+
+
+def _near_observed(
+    occupied: NDArray[np.bool_], observed: NDArray[np.floating], config: SurfaceConfig
+) -> NDArray[np.bool_]:
+    """The connected parts of `occupied` that come near an observed point (n, 3), in cells."""
+    from scipy.ndimage import distance_transform_edt
+    from skimage.measure import label
+
+    cells = np.rint(observed).astype(np.int64)
+    cells = cells[((cells >= 0) & (cells < occupied.shape)).all(axis=1)]
+    if not len(cells):
+        return np.zeros_like(occupied)
+    far = np.ones(occupied.shape, dtype=bool)
+    far[tuple(cells.T)] = False
+    near = distance_transform_edt(far) * config.spacing <= config.keep_distance
+    parts = label(occupied, connectivity=3)
+    return np.asarray(np.isin(parts, np.unique(parts[near & occupied])) & occupied)

@@ -1,0 +1,133 @@
+"""preview.png: the input beside the reconstruction, from the camera and from behind."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brrp_cli.frames.picture import draw_masks
+from brrp_cli.surface.colours import (
+    logit_spread,
+    object_colour,
+    scale_top,
+    uncertainty_colours,
+)
+from brrp_cli.surface.render import View, render, view_from_behind
+
+if TYPE_CHECKING:
+    from brrp_cli.api import Reconstruction
+
+Picture = NDArray[np.uint8]
+
+PANEL_WIDTH = 480
+CAPTION = 28
+INK = (30, 30, 30)
+
+
+def preview(result: Reconstruction) -> Picture:
+    """Six panels (H, W, 3): masks, shapes from the camera and from behind; list, uncertainty."""
+    view = _panel_view(result)
+    behind = view_from_behind(view, _middle(result), _up(result))
+    found = result.reconstructed
+    surfaces = [o.surface for o in found if o.surface is not None]
+    top = scale_top([s.uncertainty for s in surfaces])
+    unsure = [uncertainty_colours(s.uncertainty, top) for s in surfaces]
+    # The colour of an object is that of its mask.
+    order = {i: n for n, i in enumerate(result.frame.object_ids)}
+    shapes = [
+        np.tile(object_colour(order[o.object_id]), (len(o.surface.vertices), 1))
+        for o in found
+        if o.surface is not None
+    ]
+    masks = draw_masks(result.frame.rgb, result.frame.segmap)
+    rows = [
+        [
+            _captioned(_resized(masks, view.shape), "input and masks"),
+            _captioned(render(surfaces, shapes, view), "reconstruction, from the camera"),
+            _captioned(render(surfaces, shapes, behind), "from behind"),
+        ],
+        [
+            _captioned(_listing(result, view.shape), f"retrieved by {result.retriever}"),
+            _captioned(
+                _with_scale(render(surfaces, unsure, view), top),
+                "uncertainty: spread of the logits, from the camera",
+            ),
+            _captioned(_with_scale(render(surfaces, unsure, behind), top), "from behind"),
+        ],
+    ]
+    return np.vstack([np.hstack(row) for row in rows])
+
+
+def _panel_view(result: Reconstruction) -> View:
+    height, width = result.frame.shape
+    factor = PANEL_WIDTH / width
+    K = result.frame.K * np.array([[factor], [factor], [1.0]])
+    return View(K, np.eye(4), (round(height * factor), PANEL_WIDTH))
+
+
+def _middle(result: Reconstruction) -> NDArray[np.float64]:
+    centers = [o.center for o in result.objects if o.center is not None]
+    return np.mean(centers, axis=0) if centers else np.array([0.0, 0.0, 1.0])
+
+
+def _up(result: Reconstruction) -> NDArray[np.float64]:
+    """The table's normal; without a table, up in the image."""
+    return np.array([0.0, -1.0, 0.0]) if result.plane is None else result.plane.normal
+
+
+def _resized(picture: Picture, shape: tuple[int, int]) -> Picture:
+    from PIL import Image
+
+    height, width = shape
+    return np.asarray(Image.fromarray(picture).resize((width, height)))
+
+
+def _font(size: int) -> Any:
+    from PIL import ImageFont
+
+    return ImageFont.load_default(size)
+
+
+def _captioned(picture: Picture, text: str) -> Picture:
+    from PIL import Image, ImageDraw
+
+    bar = Image.new("RGB", (picture.shape[1], CAPTION), "white")
+    ImageDraw.Draw(bar).text((8, 6), text, fill=INK, font=_font(14))
+    return np.vstack([np.asarray(bar), picture])
+
+
+def _listing(result: Reconstruction, shape: tuple[int, int]) -> Picture:
+    """One line for each object: id, status, and what was retrieved."""
+    from PIL import Image, ImageDraw
+
+    height, width = shape
+    panel = Image.new("RGB", (width, height), "white")
+    draw = ImageDraw.Draw(panel)
+    line = min(44, (height - 8) // max(len(result.objects), 1))
+    size = max(8, min(13, line // 2 - 3))
+    for row, item in enumerate(result.objects):
+        y = 6 + row * line
+        colour = tuple(int(c) for c in object_colour(row)[:3])
+        draw.rectangle((8, y, 20, y + 12), fill=colour)
+        names = ", ".join(f"{r.name} {r.probability:.2f}" for r in item.retrieved)
+        draw.text((26, y), f"{item.object_id}: {item.status}", fill=INK, font=_font(size))
+        draw.text((26, y + line // 2 - 2), names or item.message, fill=INK, font=_font(size))
+    return np.asarray(panel)
+
+
+def _with_scale(picture: Picture, top: float) -> Picture:
+    """The picture with a colour bar at its foot."""
+    from PIL import Image, ImageDraw
+
+    image = Image.fromarray(picture)
+    height, width = picture.shape[:2]
+    steps = np.linspace(0, top, width // 3)
+    bar = np.tile(uncertainty_colours(steps**2, top)[:, :3], (8, 1, 1))
+    image.paste(Image.fromarray(bar), (10, height - 16))
+    draw = ImageDraw.Draw(image)
+    draw.text((10, height - 32), "0", fill=INK, font=_font(11))
+    label = f"{float(logit_spread(np.array(top**2))):.2g}"
+    draw.text((10 + width // 3 - 14, height - 32), label, fill=INK, font=_font(11))
+    return np.asarray(image)
