@@ -41,5 +41,5 @@ def choose_retriever(
             )
         from brrp_cli.retrieval.clip import ClipRetriever
 
-        return ClipRetriever(folder, prior.descriptions)
+        return ClipRetriever(folder, [prior.descriptions[name] for name in prior.names])
     raise RetrievalError("No such retriever", found=name, expected=", ".join(RETRIEVERS))
