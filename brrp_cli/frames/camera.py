@@ -1,0 +1,115 @@
+"""Checks of a camera's intrinsics and pose, and intrinsics fitted to organised points."""
+
+from __future__ import annotations
+
+import logging
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brrp_cli.errors import FrameError
+
+log = logging.getLogger(__name__)
+
+MAX_RESIDUAL = 2.0  # pixels, median; above it the points are no pinhole image
+_EXPECTED_K = "[[fx, 0, cx], [0, fy, cy], [0, 0, 1]], pixels, fx and fy > 0"
+
+
+def check_intrinsics(
+    K: NDArray[Any], shape: tuple[int, int], source: Path | None
+) -> NDArray[np.float64]:
+    """`K` (3, 3) as float64. Errors: FrameError if it is no pinhole matrix of an (H, W) image."""
+
+    def refuse(what: str, fix: str | None = None) -> FrameError:
+        found = np.array2string(K, separator=", ").replace("\n", "")
+        return FrameError(what, where=source, expected=_EXPECTED_K, found=found, fix=fix)
+
+    if K.shape != (3, 3):
+        raise FrameError("K has the wrong shape", where=source, expected=(3, 3), found=K.shape)
+    if K.dtype.kind not in "iuf" or not np.isfinite(K).all():
+        raise refuse("K does not hold finite numbers")
+    K = K.astype(np.float64)
+    if (K[2, :2] != 0).any() and (K[:2, 2] == 0).all() and K[2, 2] == 1:
+        raise refuse("K is transposed", "pass K.T")
+    if K[0, 0] <= 0 or K[1, 1] <= 0:
+        raise refuse("K has a focal length that is not positive")
+    # Back-projection knows no skew, and skew is 0 in every camera that people use here.
+    if not np.array_equal(K[2], [0, 0, 1]) or K[1, 0] != 0 or abs(K[0, 1]) > 1e-3 * K[0, 0]:
+        raise refuse("K is no pinhole matrix without skew")
+    height, width = shape
+    if max(K[0, 0] / width, K[1, 1] / height) < 0.05:
+        raise refuse("K is not in pixels", "multiply normalised intrinsics by the image's size")
+    if not (0 <= K[0, 2] <= width and 0 <= K[1, 2] <= height):
+        log.warning(
+            "The principal point (%.1f, %.1f) lies outside the %d x %d image: is K of another"
+            " resolution or crop?",
+            K[0, 2],
+            K[1, 2],
+            width,
+            height,
+        )
+    return K
+
+
+def check_pose(T: NDArray[Any], source: Path | None) -> NDArray[np.float64]:
+    """`T_world_cam` (4, 4) as float64. Errors: FrameError if it is no rigid transform."""
+    rigid = (
+        T.shape == (4, 4)
+        and T.dtype.kind in "iuf"
+        and bool(np.isfinite(T).all())
+        and np.allclose(T[3], [0, 0, 0, 1], atol=1e-6)
+        and np.allclose(T[:3, :3] @ T[:3, :3].T, np.eye(3), atol=1e-3)
+        and bool(np.linalg.det(T[:3, :3]) > 0)
+    )
+    if not rigid:
+        raise FrameError(
+            "T_world_cam is no rigid transform",
+            where=source,
+            expected="(4, 4): rotation, translation in metres, last row 0 0 0 1",
+            found=np.array2string(T, separator=", ", precision=4).replace("\n", ""),
+            fix="transpose it if it was written column by column",
+        )
+    return T.astype(np.float64)
+
+
+def _residual(ratio: NDArray[Any], pixel: NDArray[Any], f: float, c: float) -> float:
+    return float(np.median(np.abs(f * ratio + c - pixel)))
+
+
+def fit_intrinsics(
+    points: NDArray[np.floating], given: NDArray[np.float64] | None, source: Path | None
+) -> NDArray[np.float64]:
+    """Pinhole intrinsics (3, 3) of organised points (H, W, 3), camera frame, NaN = no return.
+
+    Least squares on u = fx x/z + cx and v = fy y/z + cy; a `given` K is checked in place of that.
+
+    Errors: FrameError if the points are no pinhole image.
+    """
+    height, width = points.shape[:2]
+    valid = np.isfinite(points).all(axis=-1)
+    v, u = np.nonzero(valid)
+    seen = points[valid].astype(np.float64)
+    K = np.eye(3)
+    residuals = []
+    for axis, pixel in enumerate((u, v)):
+        ratio = seen[:, axis] / seen[:, 2]
+        if given is not None:
+            f, c = given[axis, axis], given[axis, 2]
+        elif np.ptp(pixel) < 2 or np.ptp(ratio) == 0:
+            f, c = np.nan, np.nan
+        else:
+            f, c = np.polyfit(ratio, pixel, 1)
+        K[axis, axis], K[axis, 2] = f, c
+        residuals.append(_residual(ratio, pixel, f, c))
+    if not (max(residuals) <= MAX_RESIDUAL and K[0, 0] > 0 and K[1, 1] > 0):
+        raise FrameError(
+            "xyz is no pinhole camera's image",
+            where=source,
+            expected="organised points in the camera frame: x right, y down, z forward",
+            found=f"fx = {K[0, 0]:.4g}, fy = {K[1, 1]:.4g}, median error"
+            f" {max(residuals):.3g} pixels",
+            fix="transform the points to the camera frame, or pass depth and K",
+        )
+    return check_intrinsics(K, (height, width), source)
