@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brrp_cli.config import RegistrationConfig
-from brrp_cli.dependencies import import_open3d
+from brrp_cli.dependencies import import_open3d, one_openmp_thread
 from brrp_cli.prior.objects import FeatureCloud
 
 
@@ -28,23 +28,24 @@ def match_features(
     o3d = import_open3d()
     pipeline = o3d.pipelines.registration
     distance = config.correspondence_distance
-    # Seeded right before the call, or an earlier draw in the process would change the result.
-    o3d.utility.random.seed(seed)
-    result = pipeline.registration_ransac_based_on_feature_matching(
-        _cloud(source),
-        _cloud(target),
-        _feature(source),
-        _feature(target),
-        False,
-        distance,
-        pipeline.TransformationEstimationPointToPoint(False),
-        config.draw,
-        [
-            pipeline.CorrespondenceCheckerBasedOnEdgeLength(config.edge_length),
-            pipeline.CorrespondenceCheckerBasedOnDistance(distance),
-        ],
-        pipeline.RANSACConvergenceCriteria(config.iterations, config.confidence),
-    )
+    with one_openmp_thread():
+        # Seeded right before the call, or an earlier draw in the process would change the result.
+        o3d.utility.random.seed(seed)
+        result = pipeline.registration_ransac_based_on_feature_matching(
+            _cloud(source),
+            _cloud(target),
+            _feature(source),
+            _feature(target),
+            False,
+            distance,
+            pipeline.TransformationEstimationPointToPoint(False),
+            config.draw,
+            [
+                pipeline.CorrespondenceCheckerBasedOnEdgeLength(config.edge_length),
+                pipeline.CorrespondenceCheckerBasedOnDistance(distance),
+            ],
+            pipeline.RANSACConvergenceCriteria(config.iterations, config.confidence),
+        )
     inliers = len(result.correspondence_set)
     # A draw that holds has at least its own pairs; without one, Open3D returns the identity.
     if inliers <= config.draw:

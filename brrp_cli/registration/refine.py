@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from brrp_cli.dependencies import import_open3d
+from brrp_cli.dependencies import import_open3d, one_openmp_thread
 
 ITERATIONS = 20
 
@@ -27,12 +27,13 @@ def refine(
     pipeline = o3d.pipelines.registration
     target = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(model.astype(np.float64)))
     target.normals = o3d.utility.Vector3dVector(normals.astype(np.float64))
-    result = pipeline.registration_icp(
-        o3d.geometry.PointCloud(o3d.utility.Vector3dVector(observed.astype(np.float64))),
-        target,
-        distance,
-        np.linalg.inv(T_observed_model),
-        pipeline.TransformationEstimationPointToPlane(),
-        pipeline.ICPConvergenceCriteria(max_iteration=ITERATIONS),
-    )
+    with one_openmp_thread():
+        result = pipeline.registration_icp(
+            o3d.geometry.PointCloud(o3d.utility.Vector3dVector(observed.astype(np.float64))),
+            target,
+            distance,
+            np.linalg.inv(T_observed_model),
+            pipeline.TransformationEstimationPointToPlane(),
+            pipeline.ICPConvergenceCriteria(max_iteration=ITERATIONS),
+        )
     return np.asarray(np.linalg.inv(result.transformation))
