@@ -2,19 +2,15 @@
 
 from __future__ import annotations
 
-import os
-import signal
-import threading
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from brrp_cli.errors import BrrpError, DependencyError, MeshError, PriorError
-from brrp_cli.files import cannot_write, sha256_file
+from brrp_cli.files import sha256_file
 from brrp_cli.prior.descriptions import describe, read_descriptions
 from brrp_cli.prior.find import MeshSource, find_meshes
+from brrp_cli.prior.guard import only_builder, sigterm_is_ctrl_c
 from brrp_cli.prior.make import make_object
 from brrp_cli.prior.manifest import (
     FILE,
@@ -31,7 +27,7 @@ from brrp_cli.prior.parameters import BuildParameters, refuse_differences
 from brrp_cli.prior.plan import plan_shards, shard_file
 from brrp_cli.prior.shard import StoredObject, open_shard, read_stored, write_shard
 from brrp_cli.prior.stock import Finished, Stock, take_stock
-from brrp_cli.prior.workers import run_tasks
+from brrp_cli.prior.workers import cpu_count, run_tasks
 
 # No mesh that ever gets done takes this long; pymeshlab can loop for ever on some.
 TIME_LIMIT = 900.0
@@ -76,7 +72,7 @@ def build_prior(
     sources = {source.name: source for source in find_meshes(meshes)}
     given = read_descriptions(descriptions) if descriptions else {}
     phrases = describe(sources, given)
-    with _only_builder(out), _sigterm_is_ctrl_c():
+    with only_builder(out), sigterm_is_ctrl_c():
         before = _previous(out)
         if before is not None and not overwrite:
             refuse_differences(before.parameters, table, out)
@@ -101,11 +97,6 @@ def build_prior(
         kept=sorted(names - set(run.made)),
         removed=sorted({e.name for e in before.objects} - names if before else ()),
     )
-
-
-def cpu_count() -> int:
-    """Processors that this process may use."""
-    return len(os.sched_getaffinity(0))
 
 
 @dataclass
@@ -260,37 +251,3 @@ def _sweep(out: Path, manifest: Manifest) -> None:
             path.unlink(missing_ok=True)
     for path in out.glob(".manifest.*.partial.json"):
         path.unlink(missing_ok=True)
-
-
-@contextmanager
-def _only_builder(out: Path) -> Iterator[None]:
-    import filelock
-
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-        lock = filelock.FileLock(out / ".lock", timeout=0)
-        lock.acquire()
-    except filelock.Timeout as error:
-        raise PriorError(
-            "Another build is at work on this prior",
-            where=out,
-            fix="wait until it has ended, or choose another folder with -o",
-        ) from error
-    except OSError as error:
-        raise cannot_write(out, error) from error
-    try:
-        yield
-    finally:
-        lock.release()
-
-
-@contextmanager
-def _sigterm_is_ctrl_c() -> Iterator[None]:
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-    before = signal.signal(signal.SIGTERM, signal.default_int_handler)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGTERM, before)

@@ -40,7 +40,9 @@ def test_the_mix_is_what_the_parameters_say() -> None:
     points, _ = draw_samples(mesh, 8000, mix, np.random.default_rng(1))
     assert points.dtype == np.float32
     assert points.shape == (8000, 3)
-    distance = np.abs(trimesh.proximity.ProximityQuery(mesh).signed_distance(points))
+    beyond = np.abs(points) - np.array([1.0, 0.5, 0.25])
+    outside = np.linalg.norm(np.maximum(beyond, 0), axis=1)
+    distance = np.where(outside > 0, outside, -beyond.max(axis=1))
     # Of the near half, at least 95 % lie within 2 sigma of the surface; few uniform ones do.
     assert (distance < 0.2).mean() > 0.45
     assert (distance < 0.05).mean() > 0.3
