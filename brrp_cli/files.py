@@ -91,18 +91,34 @@ def check_writable(folder: Path) -> None:
         raise cannot_write(folder, error) from error
 
 
-@contextmanager
-def atomic_folder(folder: Path, *, overwrite: bool) -> Iterator[Path]:
-    """Yield a temporary folder beside `folder`; on success it takes the place of `folder`.
-
-    Errors: OutputError if `folder` exists and `overwrite` is false, if it is a file, or on any
-    OSError.
+def refuse_folder(folder: Path, *, overwrite: bool, mark: str) -> None:
+    """OutputError if `folder` may not be replaced: it is there without `overwrite`, it is a file,
+    or it is neither empty nor holds the file `mark`, so that it is nothing that brrp wrote.
     """
-    if folder.exists() and not folder.is_dir():
+    refuse_existing(folder, overwrite=overwrite)
+    if not folder.exists():
+        return
+    if not folder.is_dir():
         raise OutputError(
             "The output folder is a file", where=folder, fix="choose another folder with -o"
         )
-    refuse_existing(folder, overwrite=overwrite)
+    if any(folder.iterdir()) and not (folder / mark).exists():
+        raise OutputError(
+            "The output folder holds other things, and --overwrite would delete them",
+            where=folder,
+            expected=f"an empty folder, or one with {mark} in it from an earlier run",
+            fix="choose another folder with -o, or delete this one yourself",
+        )
+
+
+@contextmanager
+def atomic_folder(folder: Path, *, overwrite: bool, mark: str) -> Iterator[Path]:
+    """Yield a temporary folder beside `folder`; on success it takes the place of `folder`.
+
+    mark : a file that every such folder holds; what lacks it is never replaced. Errors: OutputError
+    if `folder` may not be replaced, or on any OSError.
+    """
+    refuse_folder(folder, overwrite=overwrite, mark=mark)
     try:
         folder.parent.mkdir(parents=True, exist_ok=True)
         partial = Path(tempfile.mkdtemp(dir=folder.parent, prefix=f".{folder.name}.partial."))

@@ -6,6 +6,8 @@ import pytest
 from brrp_cli.errors import OutputError
 from brrp_cli.files import atomic_folder, atomic_path, sha256_file, write_bytes
 
+MARK = "old"
+
 
 class CrashError(Exception):
     pass
@@ -75,7 +77,7 @@ def test_a_file_below_a_regular_file_cannot_be_written(tmp_path: Path) -> None:
 
 def test_a_folder_appears_whole(tmp_path: Path) -> None:
     target = tmp_path / "new" / "out"
-    with atomic_folder(target, overwrite=False) as partial:
+    with atomic_folder(target, overwrite=False, mark=MARK) as partial:
         (partial / "meshes").mkdir()
         (partial / "meshes" / "7.ply").write_bytes(b"ply")
         assert not target.exists()
@@ -84,12 +86,33 @@ def test_a_folder_appears_whole(tmp_path: Path) -> None:
     assert target.stat().st_mode & 0o777 == 0o755
 
 
+@pytest.mark.parametrize("overwrite", [False, True])
+def test_a_folder_that_brrp_did_not_write_is_never_replaced(
+    tmp_path: Path, overwrite: bool
+) -> None:
+    (tmp_path / "thesis").mkdir()
+    (tmp_path / "thesis" / "chapter1").write_bytes(b"years of work")
+    with (
+        pytest.raises(OutputError),
+        atomic_folder(tmp_path / "thesis", overwrite=overwrite, mark=MARK),
+    ):
+        pytest.fail("the body ran")
+    assert names(tmp_path / "thesis") == ["chapter1"]
+
+
+def test_an_empty_folder_may_be_filled(tmp_path: Path) -> None:
+    (tmp_path / "out").mkdir()
+    with atomic_folder(tmp_path / "out", overwrite=True, mark=MARK) as partial:
+        (partial / "new").write_bytes(b"new")
+    assert names(tmp_path / "out") == ["new"]
+
+
 def test_an_existing_folder_is_refused_before_any_work(tmp_path: Path) -> None:
     (tmp_path / "out").mkdir()
     (tmp_path / "out" / "old").write_bytes(b"old")
     with (
         pytest.raises(OutputError, match="--overwrite"),
-        atomic_folder(tmp_path / "out", overwrite=False),
+        atomic_folder(tmp_path / "out", overwrite=False, mark=MARK),
     ):
         pytest.fail("the body ran")
     assert names(tmp_path / "out") == ["old"]
@@ -98,7 +121,7 @@ def test_an_existing_folder_is_refused_before_any_work(tmp_path: Path) -> None:
 def test_overwriting_replaces_the_whole_folder(tmp_path: Path) -> None:
     (tmp_path / "out").mkdir()
     (tmp_path / "out" / "old").write_bytes(b"old")
-    with atomic_folder(tmp_path / "out", overwrite=True) as partial:
+    with atomic_folder(tmp_path / "out", overwrite=True, mark=MARK) as partial:
         (partial / "new").write_bytes(b"new")
         assert names(tmp_path / "out") == ["old"]
     assert names(tmp_path / "out") == ["new"]
@@ -108,7 +131,10 @@ def test_overwriting_replaces_the_whole_folder(tmp_path: Path) -> None:
 def test_a_crash_leaves_the_old_folder_and_no_rest(tmp_path: Path) -> None:
     (tmp_path / "out").mkdir()
     (tmp_path / "out" / "old").write_bytes(b"old")
-    with pytest.raises(CrashError), atomic_folder(tmp_path / "out", overwrite=True) as partial:
+    with (
+        pytest.raises(CrashError),
+        atomic_folder(tmp_path / "out", overwrite=True, mark=MARK) as partial,
+    ):
         (partial / "half").write_bytes(b"half")
         raise CrashError
     assert names(tmp_path / "out") == ["old"]
@@ -120,7 +146,7 @@ def test_a_file_in_the_place_of_the_folder_is_kept(tmp_path: Path, overwrite: bo
     (tmp_path / "out").write_bytes(b"precious")
     with (
         pytest.raises(OutputError),
-        atomic_folder(tmp_path / "out", overwrite=overwrite),
+        atomic_folder(tmp_path / "out", overwrite=overwrite, mark=MARK),
     ):
         pytest.fail("the body ran")
     assert (tmp_path / "out").read_bytes() == b"precious"
@@ -131,7 +157,7 @@ def test_a_folder_below_a_regular_file_cannot_be_written(tmp_path: Path) -> None
     (tmp_path / "file").write_bytes(b"")
     with (
         pytest.raises(OutputError, match="Cannot write"),
-        atomic_folder(tmp_path / "file" / "out", overwrite=False),
+        atomic_folder(tmp_path / "file" / "out", overwrite=False, mark=MARK),
     ):
         pytest.fail("the body ran")
 

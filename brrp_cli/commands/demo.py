@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from brrp_cli.demo.score import Score
 
 SOME_FAILED = 3
+FRAME = "frame.npz"
 
 
 @click.command("demo")
@@ -50,14 +51,14 @@ def command(output: Path, seed: int, preset_name: str, device: str, overwrite: b
     from brrp_cli.demo.scene import make_scene
     from brrp_cli.demo.score import score
     from brrp_cli.demo.starter import starter_prior
-    from brrp_cli.files import atomic_folder, check_writable, refuse_existing
+    from brrp_cli.files import atomic_folder, check_writable, refuse_folder
     from brrp_cli.frames.npz import save_frame
     from brrp_cli.prior.store import open_prior
     from brrp_cli.retrieval.choose import choose_retriever
     from brrp_cli.surface.results import write_results
 
     start = time.perf_counter()
-    refuse_existing(output, overwrite=overwrite)
+    refuse_folder(output, overwrite=overwrite, mark=FRAME)
     check_writable(output.parent)
     prior = open_prior(starter_prior())
     click.echo(f"Prior: {prior.path} (starter prior), {len(prior.names)} household shapes")
@@ -73,8 +74,8 @@ def command(output: Path, seed: int, preset_name: str, device: str, overwrite: b
         i: score(None if surface is None else surface.as_trimesh(), scene.truth[i], seed)
         for i, surface in surfaces.items()
     }
-    with atomic_folder(output, overwrite=overwrite) as partial:
-        save_frame(scene.frame, partial / "frame.npz")
+    with atomic_folder(output, overwrite=overwrite, mark=FRAME) as partial:
+        save_frame(scene.frame, partial / FRAME)
         for object_id, mesh in scene.truth.items():
             save_truth(mesh, partial / "truth" / f"object_{object_id}.ply")
         write_results(result, partial / "result")

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brrp_cli.errors import OutputError
-from brrp_cli.files import atomic_folder, check_writable, refuse_existing
+from brrp_cli.files import atomic_folder, check_writable, refuse_folder
 from brrp_cli.frames.frame import Frame
 from brrp_cli.geometry import transform_points
 from brrp_cli.inference.posterior import HilbertPosterior
@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from brrp_cli.api import Reconstruction
 
 SCHEMA = 1
+RECORD = "result.json"
 LIBRARIES = ("torch", "open3d", "numpy", "scipy", "scikit-image", "trimesh", "h5py", "onnxruntime")
 
 
@@ -42,7 +43,7 @@ def write_results(
     from PIL import Image
 
     T_target_cam = T_frame_cam(result.frame, frame)
-    with atomic_folder(Path(folder), overwrite=overwrite) as partial:
+    with atomic_folder(Path(folder), overwrite=overwrite, mark=RECORD) as partial:
         meshes = _meshes(result, T_target_cam)
         for object_id, mesh in meshes.items():
             mesh.export(partial / mesh_name(object_id))
@@ -54,7 +55,7 @@ def write_results(
         }
         save_posteriors(posteriors, partial / "posterior.h5")
         record = json.dumps(result_record(result, frame), indent=2) + "\n"
-        (partial / "result.json").write_text(record)
+        (partial / RECORD).write_text(record)
         Image.fromarray(preview(result)).save(partial / "preview.png")
         names = sorted(path.name for path in partial.iterdir())
     return [Path(folder) / name for name in names]
@@ -62,7 +63,7 @@ def write_results(
 
 def check_output(folder: Path, seen: Frame, frame: str, *, overwrite: bool) -> None:
     """Refuse early what `write_results` would refuse after the work is done."""
-    refuse_existing(folder, overwrite=overwrite)
+    refuse_folder(folder, overwrite=overwrite, mark=RECORD)
     T_frame_cam(seen, frame)
     check_writable(folder.parent)
 
