@@ -1,4 +1,4 @@
-"""Uncertainty and object ids as colours."""
+"""Uncertainty as colour."""
 
 from __future__ import annotations
 
@@ -27,10 +27,3 @@ def uncertainty_colours(variance: NDArray[np.floating], top: float) -> NDArray[n
     from matplotlib import colormaps
 
     return np.asarray(colormaps["viridis"](logit_spread(variance) / top, bytes=True))
-
-
-def object_colour(index: int) -> NDArray[np.uint8]:
-    """RGBA of the i-th object: a palette of well-told colours that repeats after twenty."""
-    from matplotlib import colormaps
-
-    return np.asarray(colormaps["tab20"](index % 20, bytes=True), dtype=np.uint8)

@@ -7,14 +7,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from brrp_cli.frames.picture import draw_masks
+from brrp_cli.frames.picture import draw_masks, object_colours
 from brrp_cli.surface.colours import (
     logit_spread,
-    object_colour,
     scale_top,
     uncertainty_colours,
 )
-from brrp_cli.surface.render import View, render, view_from_behind
+from brrp_cli.surface.render import View, fitted, render, view_from_behind
 
 if TYPE_CHECKING:
     from brrp_cli.api import Reconstruction
@@ -29,15 +28,14 @@ INK = (30, 30, 30)
 def preview(result: Reconstruction) -> Picture:
     """Six panels (H, W, 3): masks, shapes from the camera and from behind; list, uncertainty."""
     view = _panel_view(result)
-    behind = view_from_behind(view, _middle(result), _up(result))
     found = result.reconstructed
     surfaces = [o.surface for o in found if o.surface is not None]
+    behind = fitted(view_from_behind(view, _middle(result), _up(result)), surfaces)
     top = scale_top([s.uncertainty for s in surfaces])
     unsure = [uncertainty_colours(s.uncertainty, top) for s in surfaces]
-    # The colour of an object is that of its mask.
-    order = {i: n for n, i in enumerate(result.frame.object_ids)}
+    colours = object_colours(result.frame.object_ids)
     shapes = [
-        np.tile(object_colour(order[o.object_id]), (len(o.surface.vertices), 1))
+        np.tile(colours[o.object_id], (len(o.surface.vertices), 1))
         for o in found
         if o.surface is not None
     ]
@@ -107,9 +105,10 @@ def _listing(result: Reconstruction, shape: tuple[int, int]) -> Picture:
     draw = ImageDraw.Draw(panel)
     line = min(44, (height - 8) // max(len(result.objects), 1))
     size = max(8, min(13, line // 2 - 3))
+    colours = object_colours(result.frame.object_ids)
     for row, item in enumerate(result.objects):
         y = 6 + row * line
-        colour = tuple(int(c) for c in object_colour(row)[:3])
+        colour = tuple(int(c) for c in colours[item.object_id])
         draw.rectangle((8, y, 20, y + 12), fill=colour)
         names = ", ".join(f"{r.name} {r.probability:.2f}" for r in item.retrieved)
         draw.text((26, y), f"{item.object_id}: {item.status}", fill=INK, font=_font(size))

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brrp_cli.dependencies import import_open3d
-from brrp_cli.geometry import normalise, transform_points
+from brrp_cli.geometry import normalise, project, transform_points
 from brrp_cli.methods.base import Surface
 
 BACKGROUND = np.array([245, 245, 245], dtype=np.uint8)
@@ -32,6 +32,22 @@ def view_from_behind(view: View, target: NDArray[np.floating], up: NDArray[np.fl
     T[:3, :3] = half_turn
     T[:3, 3] = target - half_turn @ target
     return View(view.K, view.T_view_cam @ T, view.shape)
+
+
+def fitted(view: View, surfaces: list[Surface], margin: float = 0.05) -> View:
+    """The view with its lens changed so that all surfaces fill the picture but for a margin."""
+    if not surfaces:
+        return view
+    vertices = np.concatenate([s.vertices for s in surfaces])
+    seen = transform_points(view.T_view_cam, vertices)
+    pixels = project(seen[seen[:, 2] > 0], view.K)
+    size = np.array([view.shape[1], view.shape[0]])
+    low, high = pixels.min(axis=0), pixels.max(axis=0)
+    zoom = float(((1 - 2 * margin) * size / (high - low)).min())
+    K = view.K.copy()
+    K[:2] *= zoom
+    K[:2, 2] += size / 2 - zoom * (low + high) / 2
+    return View(K, view.T_view_cam, view.shape)
 
 
 def render(

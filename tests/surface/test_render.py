@@ -4,7 +4,7 @@ import trimesh
 
 from brrp_cli.methods.base import Surface
 from brrp_cli.surface.colours import scale_top, uncertainty_colours
-from brrp_cli.surface.render import BACKGROUND, View, render, view_from_behind
+from brrp_cli.surface.render import BACKGROUND, View, fitted, render, view_from_behind
 
 K = np.array([[200.0, 0, 100], [0, 200, 80], [0, 0, 1]])
 FRONT = View(K, np.eye(4), (160, 200))
@@ -47,6 +47,15 @@ def test_from_behind_left_is_right_and_up_stays_up():
     rows, columns = np.nonzero((picture != BACKGROUND).any(axis=-1))
     assert columns.mean() == pytest.approx(100 - 200 * 0.2, abs=1)
     assert rows.mean() == pytest.approx(80 - 200 * 0.1, abs=1)
+
+
+def test_a_fitted_view_shows_everything_and_fills_the_picture():
+    surfaces = [ball(2.0, 0, 2.0, 0.05), ball(2.4, 0.3, 2.0, 0.05)]
+    view = fitted(FRONT, surfaces, margin=0.1)
+    picture = render(surfaces, [painted(s, 255, 0, 0) for s in surfaces], view)
+    rows, columns = np.nonzero((picture != BACKGROUND).any(axis=-1))
+    assert columns.min() == pytest.approx(20, abs=2) and columns.max() == pytest.approx(180, abs=2)
+    assert rows.min() > 0 and rows.max() < 159
 
 
 def test_no_surface_gives_an_empty_picture():
