@@ -2,23 +2,36 @@
 
 from __future__ import annotations
 
+import ctypes
 import importlib
+import sys
 from types import ModuleType
 from typing import Any
 
 from brrp_cli.errors import DependencyError
 
+# Open3D and pymeshlab link to these also where nothing is ever shown on a screen. All at once:
+# who lacks one lacks the others.
+_SYSTEM_PACKAGES = (
+    "sudo apt-get install --no-install-recommends libx11-6 libgl1 libopengl0 libgomp1 "
+    "(Debian, Ubuntu)"
+)
 _FIXES = {
-    "libusb": "sudo apt-get install libusb-1.0-0, or pip install 'open3d<0.20', which needs none",
-    "libGL": "sudo apt-get install libgl1",
-    "libgomp": "sudo apt-get install libgomp1",
-    "libX11": "sudo apt-get install libx11-6",
+    "libusb": "pip install 'open3d<0.20', which needs none, or sudo apt-get install libusb-1.0-0",
+    "libX11": _SYSTEM_PACKAGES,
+    "libGL": _SYSTEM_PACKAGES,
+    "libOpenGL": _SYSTEM_PACKAGES,
+    "libgomp": _SYSTEM_PACKAGES,
 }
+# Without libOpenGL pymeshlab imports, prints a page of warnings and lacks half of its filters.
+_NEEDS = {"pymeshlab": ("libGL.so.1", "libOpenGL.so.0")} if sys.platform == "linux" else {}
 
 
 def import_library(name: str) -> ModuleType:
     """Import `name`; a missing package or system library becomes a DependencyError."""
     try:
+        for library in _NEEDS.get(name, ()):
+            ctypes.CDLL(library)
         return importlib.import_module(name)
     except (ImportError, OSError) as error:
         found = str(error)

@@ -95,8 +95,13 @@ def check_writable(folder: Path) -> None:
 def atomic_folder(folder: Path, *, overwrite: bool) -> Iterator[Path]:
     """Yield a temporary folder beside `folder`; on success it takes the place of `folder`.
 
-    Errors: OutputError if `folder` exists and `overwrite` is false, or on any OSError.
+    Errors: OutputError if `folder` exists and `overwrite` is false, if it is a file, or on any
+    OSError.
     """
+    if folder.exists() and not folder.is_dir():
+        raise OutputError(
+            "The output folder is a file", where=folder, fix="choose another folder with -o"
+        )
     refuse_existing(folder, overwrite=overwrite)
     try:
         folder.parent.mkdir(parents=True, exist_ok=True)

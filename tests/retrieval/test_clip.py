@@ -3,8 +3,8 @@ from pathlib import Path
 import numpy as np
 import onnx
 import pytest
-from conftest import write_immich, write_model, write_tokenizer, write_xenova
 from onnx import TensorProto
+from small_clip import write_immich, write_model, write_tokenizer, write_xenova
 
 from brrp_cli.errors import RetrievalError
 from brrp_cli.frames.frame import Frame

@@ -1,7 +1,7 @@
 from pathlib import Path
 
 import pytest
-from conftest import write_tokenizer
+from small_clip import write_tokenizer
 
 from brrp_cli.errors import RetrievalError
 from brrp_cli.retrieval.clip_text import ClipTokenizer, prompt

@@ -1,0 +1,98 @@
+"""Ray casting with Open3D (Embree): what a camera sees, what lies inside."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brrp_cli.dependencies import import_open3d
+from brrp_cli.errors import MeshError
+
+if TYPE_CHECKING:
+    import trimesh
+
+# The majority of rays decides, since a ray through an edge may miss both of its faces. Points
+# 0.05 mm inside the edge of a cube were still misjudged with 7.
+RAYS = 11
+
+
+def raycasting_scene(meshes: Sequence[trimesh.Trimesh]) -> Any:
+    """An Open3D RaycastingScene in which mesh i has geometry id i."""
+    o3d = import_open3d()
+    scene = o3d.t.geometry.RaycastingScene()
+    for mesh in meshes:
+        scene.add_triangles(
+            o3d.core.Tensor(np.array(mesh.vertices, dtype=np.float32)),
+            o3d.core.Tensor(np.array(mesh.faces, dtype=np.uint32)),
+        )
+    return scene
+
+
+@dataclass(frozen=True)
+class Sight:
+    """What a pinhole camera sees of meshes in its own frame, pixel by pixel.
+
+    depth : (H, W) float32, metres along z, 0 where nothing is hit
+    index : (H, W) int64, which mesh, -1 where nothing is hit
+    normals : (H, W, 3) float32, unit, of the face that is hit, camera frame
+    """
+
+    depth: NDArray[np.float32]
+    index: NDArray[np.int64]
+    normals: NDArray[np.float32]
+
+
+def look(
+    meshes: Sequence[trimesh.Trimesh], K: NDArray[np.floating], shape: tuple[int, int]
+) -> Sight:
+    """Cast one ray through each pixel centre of an image of `shape` (H, W).
+
+    meshes : in the camera frame (x right, y down, z forward), metres; K : (3, 3), pixels.
+    """
+    o3d = import_open3d()
+    height, width = shape
+    u, v = np.meshgrid(np.arange(width), np.arange(height))
+    rays = np.zeros((height, width, 6), dtype=np.float32)
+    # With z = 1 in the direction, the distance along the ray is the depth itself.
+    rays[..., 3] = (u - K[0, 2]) / K[0, 0]
+    rays[..., 4] = (v - K[1, 2]) / K[1, 1]
+    rays[..., 5] = 1.0
+    hits = raycasting_scene(meshes).cast_rays(o3d.core.Tensor(rays))
+    depth = hits["t_hit"].numpy()
+    hit = np.isfinite(depth)
+    return Sight(
+        depth=np.where(hit, depth, 0.0).astype(np.float32),
+        index=np.where(hit, hits["geometry_ids"].numpy().astype(np.int64), -1),
+        normals=hits["primitive_normals"].numpy(),
+    )
+
+
+def inside(mesh: trimesh.Trimesh, points: NDArray[np.floating]) -> NDArray[np.bool_]:
+    """Which of `points` (n, 3), in the mesh's frame, lie inside a closed mesh: (n,) bool.
+
+    Errors: MeshError for a mesh that is not closed, where the question has no answer.
+    """
+    if len(mesh.faces) == 0 or not mesh.is_watertight:
+        raise MeshError(
+            "Inside and outside of an open mesh are not defined",
+            expected="a closed surface",
+            found=f"{len(mesh.faces)} faces, not closed",
+            fix="repair the mesh first",
+        )
+    low, high = mesh.bounds
+    found = ((points >= low) & (points <= high)).all(axis=-1)
+    if not found.any():
+        return np.asarray(found)
+    o3d = import_open3d()
+    # Rays are float32: far from the origin they would lose millimetres.
+    center = (low + high) / 2
+    centred = mesh.copy()
+    centred.apply_translation(-center)
+    query = o3d.core.Tensor(np.ascontiguousarray(points[found] - center, dtype=np.float32))
+    occupancy = raycasting_scene([centred]).compute_occupancy(query, nsamples=RAYS)
+    found[found] = occupancy.numpy() > 0.5
+    return np.asarray(found)

@@ -1,0 +1,103 @@
+import json
+import re
+import subprocess
+import sys
+
+import click
+import pytest
+from click.testing import CliRunner
+
+from brrp_cli.cli import COMMANDS, LazyGroup, main
+from brrp_cli.errors import BrrpError
+from brrp_cli.version import __version__
+
+HEAVY = ["torch", "open3d", "onnxruntime", "pymeshlab", "trimesh", "scipy", "skimage", "h5py"]
+
+
+def imported(*arguments: str) -> set[str]:
+    """What a fresh interpreter has imported after `brrp ARGUMENTS`."""
+    code = (
+        "import json, sys\n"
+        "from brrp_cli.cli import main\n"
+        f"main({list(arguments)!r}, standalone_mode=False)\n"
+        "print('MODULES' + json.dumps(sorted(sys.modules)))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    return set(json.loads(done.stdout.rpartition("MODULES")[2]))
+
+
+def test_help_lists_every_command() -> None:
+    done = CliRunner().invoke(main, ["--help"])
+    assert done.exit_code == 0
+    for name, (_, text) in COMMANDS.items():
+        assert re.search(rf"^  {name}\s+{re.escape(text[:20])}", done.output, re.MULTILINE)
+
+
+def test_help_imports_nothing_heavy() -> None:
+    assert not imported("--help") & {*HEAVY, "numpy"}
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_every_command_has_help_with_an_example(name: str) -> None:
+    done = CliRunner().invoke(main, [name, "--help"])
+    assert done.exit_code == 0, done.output
+    assert "Example" in done.output
+    assert f"brrp {name}" in done.output
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_help_of_a_command_imports_nothing_heavy(name: str) -> None:
+    assert not imported(name, "--help") & set(HEAVY)
+
+
+def test_version_of_the_installed_module() -> None:
+    done = subprocess.run(
+        [sys.executable, "-m", "brrp_cli", "--version"], capture_output=True, text=True, check=True
+    )
+    assert done.stdout == f"brrp, version {__version__}\n"
+
+
+def test_an_unknown_command_is_a_usage_error() -> None:
+    done = CliRunner().invoke(main, ["recontsruct"])
+    assert done.exit_code == 2
+    assert "No such command 'recontsruct'" in done.stderr
+
+
+class Failing(LazyGroup):
+    """The group of `brrp` with one command, which fails as `error` says."""
+
+    error: Exception
+
+    def get_command(self, ctx: click.Context, name: str) -> click.Command:
+        def fail() -> None:
+            raise self.error
+
+        return click.Command(name, callback=fail)
+
+
+def fail_with(error: Exception) -> click.testing.Result:
+    group = Failing("brrp")
+    group.error = error
+    return CliRunner().invoke(group, ["anything"])
+
+
+def test_a_brrp_error_is_one_message_without_traceback() -> None:
+    done = fail_with(BrrpError("The frame has no depth", where="a.npz", fix="add depth"))
+    assert done.exit_code == 1
+    assert done.stdout == ""
+    assert done.stderr.splitlines() == [
+        "Error: The frame has no depth",
+        "  where:    a.npz",
+        "  fix:      add depth",
+    ]
+
+
+def test_a_brrp_error_brings_its_exit_code() -> None:
+    error = BrrpError("Some objects failed")
+    error.exit_code = 3
+    assert fail_with(error).exit_code == 3
+
+
+def test_any_other_exception_is_a_bug_and_keeps_its_traceback() -> None:
+    done = fail_with(ZeroDivisionError("ours"))
+    assert isinstance(done.exception, ZeroDivisionError)

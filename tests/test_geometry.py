@@ -1,0 +1,67 @@
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from brrp_cli.geometry import backproject, normalise, project, similarity, transform_points
+
+K = np.array([[600.0, 0, 315.5], [0, 610.0, 243.25], [0, 0, 1]])
+
+
+def test_backprojected_pixels_project_back_to_themselves() -> None:
+    depth = np.random.default_rng(0).uniform(0.3, 3, (48, 64))
+    points = backproject(depth, K)
+    assert points.dtype == np.float32
+    assert np.allclose(points[..., 2], depth)
+    v, u = np.mgrid[:48, :64]
+    uv = project(points.reshape(-1, 3).astype(np.float64), K)
+    assert np.allclose(uv, np.stack([u, v], axis=-1).reshape(-1, 2), atol=1e-3)
+
+
+def test_a_pixel_right_of_and_below_the_centre_has_positive_x_and_y() -> None:
+    depth = np.zeros((480, 640))
+    depth[400, 600] = 2.0
+    x, y, z = backproject(depth, K)[400, 600]
+    assert np.allclose([x, y, z], [(600 - 315.5) / 300, (400 - 243.25) / 305, 2])
+
+
+def test_pixels_without_depth_are_nan() -> None:
+    depth = np.array([[0.0, -1.0, np.nan], [np.inf, -np.inf, 1.0]])
+    assert np.isnan(backproject(depth, K)).all(axis=-1).tolist() == [
+        [True, True, True],
+        [True, True, False],
+    ]
+
+
+def test_similarity_scales_then_rotates_then_moves() -> None:
+    quarter_turn = Rotation.from_euler("z", 90, degrees=True).as_matrix()
+    T = similarity(2.0, quarter_turn, np.array([10.0, 20, 30]))
+    assert np.allclose(
+        transform_points(T, np.array([[1.0, 0, 0], [0, 0, 1]])), [[10, 22, 30], [10, 20, 32]]
+    )
+
+
+def test_a_transform_and_its_inverse_cancel() -> None:
+    rng = np.random.default_rng(1)
+    T = similarity(0.37, Rotation.random(random_state=2).as_matrix(), rng.normal(size=3))
+    points = rng.normal(size=(5, 7, 3))
+    there = transform_points(T, points)
+    assert there.shape == points.shape
+    assert np.allclose(transform_points(np.linalg.inv(T), there), points)
+
+
+def test_transforms_compose_by_their_names() -> None:
+    rng = np.random.default_rng(3)
+    T_world_cam = similarity(rotation=Rotation.random(random_state=4).as_matrix())
+    T_cam_object = similarity(0.5, translation=rng.normal(size=3))
+    points = rng.normal(size=(6, 3))
+    assert np.allclose(
+        transform_points(T_world_cam @ T_cam_object, points),
+        transform_points(T_world_cam, transform_points(T_cam_object, points)),
+    )
+
+
+def test_the_default_similarity_is_the_identity() -> None:
+    assert np.array_equal(similarity(), np.eye(4))
+
+
+def test_normalise_gives_unit_vectors_and_keeps_zeros() -> None:
+    assert np.allclose(normalise(np.array([[3.0, 0, 4], [0, 0, 0]])), [[0.6, 0, 0.8], [0, 0, 0]])
