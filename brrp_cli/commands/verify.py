@@ -1,0 +1,38 @@
+"""`brrp verify`: check every byte of a prior."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import click
+
+from brrp_cli.prior.locate import locate_prior
+
+
+@click.command("verify")
+@click.argument("prior", type=click.Path(path_type=Path), required=False)
+def command(prior: Path | None) -> None:
+    """Check every checksum, shape and type in PRIOR, and list all problems.
+
+    Without PRIOR: BRRP_PRIOR, else the user's data folder, else the starter prior.
+
+    \b
+    Example:
+      brrp verify prior/
+
+    Exit codes: 0 all is well, 1 there are problems.
+    """
+    from brrp_cli.prior.store import open_prior, verify_prior
+
+    folder, how = locate_prior(prior)
+    opened = open_prior(folder)
+    problems = verify_prior(opened)
+    for problem in problems:
+        click.echo(problem)
+    counts = f"{len(opened.names)} objects in {len(opened.manifest.shards)} shards"
+    if problems:
+        click.echo(f"{folder} ({how}): {counts}, {len(problems)} problems")
+        click.echo("fix: run brrp build-prior again on the same meshes", err=True)
+        sys.exit(1)
+    click.echo(f"{folder} ({how}): {counts}, all is well")

@@ -1,0 +1,296 @@
+"""Build a prior from a folder of meshes: only what is missing or changed, whatever fails."""
+
+from __future__ import annotations
+
+import os
+import signal
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from brrp_cli.errors import BrrpError, DependencyError, MeshError, PriorError
+from brrp_cli.files import cannot_write, sha256_file
+from brrp_cli.prior.descriptions import describe, read_descriptions
+from brrp_cli.prior.find import MeshSource, find_meshes
+from brrp_cli.prior.make import make_object
+from brrp_cli.prior.manifest import (
+    FILE,
+    Failure,
+    ForeignManifestError,
+    Manifest,
+    ObjectEntry,
+    ShardEntry,
+    read_manifest,
+    write_manifest,
+)
+from brrp_cli.prior.pack import pack
+from brrp_cli.prior.parameters import BuildParameters, refuse_differences
+from brrp_cli.prior.plan import plan_shards, shard_file
+from brrp_cli.prior.shard import StoredObject, open_shard, read_stored, write_shard
+from brrp_cli.prior.stock import Finished, Stock, take_stock
+from brrp_cli.prior.workers import run_tasks
+
+# No mesh that ever gets done takes this long; pymeshlab can loop for ever on some.
+TIME_LIMIT = 900.0
+
+
+class BuildStoppedError(BrrpError):
+    """Ctrl-C or SIGTERM; what was finished is kept."""
+
+    exit_code = 130
+
+
+@dataclass(frozen=True)
+class BuildReport:
+    """What a build did. `made`, `kept`, `removed`: names of objects."""
+
+    path: Path
+    manifest: Manifest
+    made: list[str]
+    kept: list[str]
+    removed: list[str]
+
+
+def build_prior(
+    meshes: Path,
+    out: Path,
+    parameters: BuildParameters | None = None,
+    *,
+    descriptions: Path | None = None,
+    workers: int | None = None,
+    overwrite: bool = False,
+    time_limit: float = TIME_LIMIT,
+    progress: bool = False,
+) -> BuildReport:
+    """Make the prior in `out` hold the objects of the folder `meshes`, and no others.
+
+    The same meshes and parameters give the same bytes, however many workers run and however often
+    the build was interrupted. Errors: MeshError when there are no meshes or all of them fail;
+    PriorError when the prior there has other parameters (and not `overwrite`) or another build is
+    at work on it; BuildStoppedError; OutputError.
+    """
+    table = (parameters or BuildParameters()).as_dict()
+    sources = {source.name: source for source in find_meshes(meshes)}
+    given = read_descriptions(descriptions) if descriptions else {}
+    phrases = describe(sources, given)
+    with _only_builder(out), _sigterm_is_ctrl_c():
+        before = _previous(out)
+        if before is not None and not overwrite:
+            refuse_differences(before.parameters, table, out)
+        run = _Run(out, table, sources, take_stock(out, before, table))
+        run.hash_inputs(meshes)
+        run.make(parameters or BuildParameters(), workers or cpu_count(), time_limit, progress)
+        manifest = run.manifest(phrases)
+        if not manifest.objects:
+            raise MeshError(
+                "None of the meshes became an object",
+                where=meshes,
+                found="\n".join(f"{f.source}: {f.reason}" for f in manifest.failed),
+            )
+        if before is None or before.as_bytes() != manifest.as_bytes():
+            write_manifest(out, manifest)
+        _sweep(out, manifest)
+    names = {entry.name for entry in manifest.objects}
+    return BuildReport(
+        path=out,
+        manifest=manifest,
+        made=sorted(run.made),
+        kept=sorted(names - set(run.made)),
+        removed=sorted({e.name for e in before.objects} - names if before else ()),
+    )
+
+
+def cpu_count() -> int:
+    """Processors that this process may use."""
+    return len(os.sched_getaffinity(0))
+
+
+@dataclass
+class _Run:
+    """What is known while a build goes on, by name of object."""
+
+    out: Path
+    parameters: dict[str, Any]
+    sources: dict[str, MeshSource]
+    stock: Stock
+    hashes: dict[str, str] = field(default_factory=dict)
+    failed: dict[str, str] = field(default_factory=dict)
+    made: dict[str, None] = field(default_factory=dict)
+    waiting: dict[str, StoredObject] = field(default_factory=dict)
+    done: dict[str, Finished] = field(default_factory=dict)
+
+    def hash_inputs(self, meshes: Path) -> None:
+        """sha256 of each mesh file; a file that cannot be read has failed."""
+        for name, source in self.sources.items():
+            try:
+                self.hashes[name] = sha256_file(source.path)
+            except OSError as error:
+                self.failed[name] = f"The mesh file cannot be read: {error.strerror}"
+
+    def make(
+        self, parameters: BuildParameters, workers: int, time_limit: float, progress: bool
+    ) -> None:
+        """Make what is not in stock; write each shard when the last of its members is there."""
+        from tqdm import tqdm
+
+        groups = plan_shards(list(self.hashes))
+        group_of = {name: group for group in groups for name in group}
+        todo = [n for group in groups for n in group if (n, self.hashes[n]) not in self.stock]
+        left = {id(group): len(set(group) & set(todo)) for group in groups}
+        for group in groups:
+            if not left[id(group)]:
+                self._write(group)
+        tasks = [(self.sources[name], self.hashes[name], parameters) for name in todo]
+        results = run_tasks(make_stored, tasks, min(workers, len(todo)), time_limit)
+        try:
+            for index, result in tqdm(
+                results, total=len(todo), desc="objects", disable=not progress or not todo
+            ):
+                self._take(todo[index], result)
+                group = group_of[todo[index]]
+                left[id(group)] -= 1
+                if not left[id(group)]:
+                    self._write(group)
+        except KeyboardInterrupt:
+            for group in groups:
+                if self.waiting.keys() & set(group):
+                    self._write(group)
+            raise BuildStoppedError(
+                "Stopped",
+                where=self.out,
+                found=f"{len(self.made)} of {len(todo)} objects made in this run; they are kept",
+                fix="run the same command again to go on",
+            ) from None
+        finally:
+            results.close()
+
+    def _take(self, name: str, result: StoredObject | BrrpError) -> None:
+        if isinstance(result, DependencyError):
+            raise result
+        if isinstance(result, BrrpError):
+            self.failed[name] = _reason(result, self.sources[name])
+        else:
+            self.waiting[name] = result
+            self.made[name] = None
+
+    def _write(self, group: list[str]) -> None:
+        """Write the shard of those members that are there, unless it stands already."""
+        here = [
+            (name, self.hashes[name])
+            for name in group
+            if name in self.waiting or (name, self.hashes[name]) in self.stock
+        ]
+        if not here:
+            return
+        file = shard_file(self.parameters, here)
+        if any(name in self.waiting or self.stock[name, sha].shard != file for name, sha in here):
+            objects = [self._take_out(name, sha) for name, sha in here]
+            write_shard(self.out / file, objects, self.parameters)
+            records = [stored.record for stored in objects]
+        else:
+            records = [self.stock[key].record for key in here]
+        for (name, _), record in zip(here, records, strict=True):
+            self.done[name] = Finished(file, record)
+
+    def _take_out(self, name: str, sha256: str) -> StoredObject:
+        if name in self.waiting:
+            return self.waiting.pop(name)
+        with open_shard(self.out / self.stock[name, sha256].shard) as shard:
+            return read_stored(shard, name)
+
+    def manifest(self, phrases: dict[str, str]) -> Manifest:
+        """All that stands now."""
+        files = sorted({finished.shard for finished in self.done.values()})
+        paths = {file: self.out / file for file in files}
+        return Manifest(
+            parameters=self.parameters,
+            objects=[
+                ObjectEntry(
+                    name=name,
+                    description=phrases[name],
+                    source=self.sources[name].relative,
+                    input_sha256=self.hashes[name],
+                    shard=self.done[name].shard,
+                    record=self.done[name].record,
+                )
+                for name in sorted(self.done)
+            ],
+            shards=[ShardEntry(f, sha256_file(p), p.stat().st_size) for f, p in paths.items()],
+            failed=[
+                Failure(name, self.sources[name].relative, self.failed[name])
+                for name in sorted(self.failed)
+            ],
+        )
+
+
+def make_stored(source: MeshSource, sha256: str, parameters: BuildParameters) -> StoredObject:
+    """A worker's task: one mesh, as its shard holds it."""
+    return pack(make_object(source, parameters), sha256)
+
+
+def _reason(error: BrrpError, source: MeshSource) -> str:
+    parts = [error.what, error.found, error.fix]
+    line = "; ".join(" ".join(str(part).split()) for part in parts if part)
+    # The manifest is the same wherever the meshes lie.
+    return line.replace(str(source.path), source.relative)
+
+
+def _previous(out: Path) -> Manifest | None:
+    if not (out / FILE).is_file():
+        return None
+    try:
+        return read_manifest(out)
+    except ForeignManifestError:
+        raise
+    except PriorError:
+        return None
+
+
+def _sweep(out: Path, manifest: Manifest) -> None:
+    """Delete shards that nothing refers to, and what killed runs left half written."""
+    listed = {out / shard.file for shard in manifest.shards}
+    for path in [
+        *(out / "shards").glob("shard-*.h5"),
+        *(out / "shards").glob(".shard-*.partial.h5"),
+    ]:
+        if path not in listed:
+            path.unlink(missing_ok=True)
+    for path in out.glob(".manifest.*.partial.json"):
+        path.unlink(missing_ok=True)
+
+
+@contextmanager
+def _only_builder(out: Path) -> Iterator[None]:
+    import filelock
+
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+        lock = filelock.FileLock(out / ".lock", timeout=0)
+        lock.acquire()
+    except filelock.Timeout as error:
+        raise PriorError(
+            "Another build is at work on this prior",
+            where=out,
+            fix="wait until it has ended, or choose another folder with -o",
+        ) from error
+    except OSError as error:
+        raise cannot_write(out, error) from error
+    try:
+        yield
+    finally:
+        lock.release()
+
+
+@contextmanager
+def _sigterm_is_ctrl_c() -> Iterator[None]:
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = signal.signal(signal.SIGTERM, signal.default_int_handler)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)

@@ -1,0 +1,94 @@
+"""One mesh file to one object of the prior."""
+
+from __future__ import annotations
+
+import dataclasses
+from importlib.metadata import version
+
+import numpy as np
+
+from brrp_cli.errors import BrrpError
+from brrp_cli.prior.clouds import feature_clouds, spread
+from brrp_cli.prior.find import MeshSource
+from brrp_cli.prior.meshes import load_mesh
+from brrp_cli.prior.objects import PriorObject
+from brrp_cli.prior.parameters import BuildParameters
+from brrp_cli.prior.poses import resting_poses
+from brrp_cli.prior.repair import repair
+from brrp_cli.prior.samples import draw_samples, surface_points
+from brrp_cli.seeds import child_rng
+
+LIBRARIES = ("brrp-cli", "manifold3d", "numpy", "open3d", "pymeshlab", "scipy", "trimesh")
+
+
+def make_object(source: MeshSource, parameters: BuildParameters) -> PriorObject:
+    """Load, repair, sample, describe geometrically. The description is left empty: the manifest
+    holds it. Errors: MeshError, with the file in `where`."""
+    original = load_mesh(source.path, parameters.units)
+    try:
+        return _from_mesh(source.name, original, parameters)
+    except BrrpError as error:
+        error.where = error.where or source.path
+        raise
+
+
+def _from_mesh(name: str, original, parameters: BuildParameters) -> PriorObject:  # type: ignore[no-untyped-def]
+    # Far from the origin float32 has no digits left for the shape: work around the centre.
+    offset = original.bounds.mean(axis=0)
+    original.apply_translation(-offset)
+    repaired = repair(original)
+    mesh = repaired.mesh
+    poses = [
+        dataclasses.replace(pose, T_plane_object=_moved(pose.T_plane_object, -offset))
+        for pose in resting_poses(mesh, parameters.poses)
+    ]
+    center = mesh.bounds.mean(axis=0)
+    extents = mesh.extents.copy()
+    half_extent = float(extents.max() / 2)
+    mesh.apply_translation(-center)
+    mesh.apply_scale(1 / half_extent)
+    seed = parameters.seed
+    samples, labels = draw_samples(
+        mesh, parameters.samples, parameters.mix, child_rng(seed, name, "samples")
+    )
+    dense, dense_normals = surface_points(
+        mesh, parameters.dense_points, child_rng(seed, name, "surface")
+    )
+    surface, normals = spread(dense, dense_normals, parameters.surface_points)
+    return PriorObject(
+        name=name,
+        description="",
+        center=center + offset,
+        half_extent=half_extent,
+        samples=samples,
+        labels=labels,
+        surface=surface.astype(np.float32),
+        surface_normals=normals.astype(np.float32),
+        clouds=feature_clouds(dense, dense_normals, parameters.features),
+        poses=poses,
+        record={
+            "extents": extents.tolist(),
+            "volume": float(mesh.volume * half_extent**3),
+            "faces": {"original": len(original.faces), "repaired": len(mesh.faces)},
+            "repair": repaired.record,
+            "inside_share": float(labels.mean()),
+            "poses": len(poses),
+            "made_with": {library: library_version(library) for library in LIBRARIES},
+        },
+    )
+
+
+def _moved(T_plane_object: np.ndarray, shift: np.ndarray) -> np.ndarray:
+    """The transform for points that are first moved by `shift`."""
+    T = T_plane_object.copy()
+    T[:3, 3] += T[:3, :3] @ shift
+    return T
+
+
+def library_version(name: str) -> str:
+    """The installed version; brrp's own is that of the code that runs."""
+    if name == "brrp-cli":
+        from brrp_cli.version import __version__
+
+        return __version__
+    return version(name)

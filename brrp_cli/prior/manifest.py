@@ -1,0 +1,161 @@
+"""manifest.json: what a prior consists of. It is written last; it is the commit.
+
+Keys: kind, schema, parameters, objects (sorted by name; each with name, description, source,
+input_sha256, shard, half_extent, record), shards (file, sha256, bytes), failed (name, source,
+reason), libraries (versions that the objects were made with). No times and no absolute paths: the
+same seed and meshes give the same bytes.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from brrp_cli.errors import PriorError
+from brrp_cli.files import write_bytes
+from brrp_cli.prior.plan import SHARD_NAME
+
+SCHEMA = 1
+KIND = "brrp-prior"
+FILE = "manifest.json"
+
+
+class ForeignManifestError(PriorError):
+    """The manifest is not ours to replace: a newer brrp wrote it, or another program."""
+
+
+@dataclass(frozen=True)
+class ObjectEntry:
+    """One object: where it came from, where it lies, how it was made."""
+
+    name: str
+    description: str
+    source: str
+    input_sha256: str
+    shard: str
+    record: dict[str, Any]
+
+
+@dataclass(frozen=True)
+class ShardEntry:
+    """One shard. `file` is relative to the prior."""
+
+    file: str
+    sha256: str
+    bytes: int
+
+
+@dataclass(frozen=True)
+class Failure:
+    """A mesh that could not become an object."""
+
+    name: str
+    source: str
+    reason: str
+
+
+@dataclass(frozen=True)
+class Manifest:
+    """The whole of it. `digest`: sha256 of the file's bytes."""
+
+    parameters: dict[str, Any]
+    objects: list[ObjectEntry]
+    shards: list[ShardEntry]
+    failed: list[Failure]
+
+    def as_bytes(self) -> bytes:
+        """The file's bytes."""
+        table = {
+            "kind": KIND,
+            "schema": SCHEMA,
+            "parameters": self.parameters,
+            "libraries": self.libraries,
+            "objects": [asdict(entry) for entry in self.objects],
+            "shards": [asdict(entry) for entry in self.shards],
+            "failed": [asdict(entry) for entry in self.failed],
+        }
+        return (json.dumps(table, indent=1, ensure_ascii=False) + "\n").encode()
+
+    @property
+    def libraries(self) -> dict[str, list[str]]:
+        """Library -> versions that the objects were made with."""
+        met: dict[str, set[str]] = {}
+        for entry in self.objects:
+            for library, version in entry.record.get("made_with", {}).items():
+                met.setdefault(library, set()).add(version)
+        return {library: sorted(versions) for library, versions in sorted(met.items())}
+
+    @property
+    def digest(self) -> str:
+        """sha256 of the manifest, and with it of all that it vouches for."""
+        return hashlib.sha256(self.as_bytes()).hexdigest()
+
+
+def write_manifest(folder: Path, manifest: Manifest) -> None:
+    """Commit."""
+    write_bytes(folder / FILE, manifest.as_bytes())
+
+
+def read_manifest(folder: Path) -> Manifest:
+    """Read and check. Errors: PriorError for a folder that is no prior, a manifest that cannot be
+    read, is of a newer schema, or names a file outside of the prior."""
+    path = folder / FILE
+    if not path.is_file():
+        raise PriorError(
+            "No prior here",
+            where=folder,
+            expected=f"a folder with {FILE}",
+            fix="make one: brrp build-prior MESHES/ -o PRIOR/",
+        )
+    try:
+        table = json.loads(path.read_text(encoding="utf-8"))
+        _refuse_foreign(table, path)
+        manifest = Manifest(
+            parameters=dict(table["parameters"]),
+            objects=[ObjectEntry(**entry) for entry in table["objects"]],
+            shards=[ShardEntry(**entry) for entry in table["shards"]],
+            failed=[Failure(**entry) for entry in table["failed"]],
+        )
+        _check(manifest)
+    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
+        raise PriorError(
+            "The prior's manifest cannot be used",
+            where=path,
+            found=f"{type(error).__name__}: {error}",
+            fix="restore the file, or run brrp build-prior again; finished shards are kept",
+        ) from error
+    return manifest
+
+
+def _refuse_foreign(table: dict[str, Any], path: Path) -> None:
+    if table.get("kind") != KIND:
+        raise ForeignManifestError(
+            "The manifest there is not that of a prior",
+            where=path,
+            expected=f"kind {KIND}",
+            found=f"kind {table.get('kind')}",
+        )
+    if int(table["schema"]) > SCHEMA:
+        raise ForeignManifestError(
+            "The prior was written by a newer brrp",
+            where=path,
+            expected=f"schema {SCHEMA}",
+            found=f"schema {table['schema']}",
+            fix="pip install --upgrade brrp-cli",
+        )
+
+
+def _check(manifest: Manifest) -> None:
+    files = [entry.file for entry in manifest.shards]
+    for file in files:
+        if not SHARD_NAME.fullmatch(file):
+            raise ValueError(f"a shard named {file!r}")
+    names = [entry.name for entry in manifest.objects]
+    if len(set(names)) < len(names):
+        raise ValueError("an object that stands there twice")
+    for entry in manifest.objects:
+        if entry.shard not in files:
+            raise ValueError(f"{entry.name} lies in {entry.shard!r}, which is not listed")

@@ -1,0 +1,62 @@
+"""Between what the rest of the code handles (PriorObject) and what a shard holds (arrays)."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from brrp_cli.geometry import normalise
+from brrp_cli.prior.objects import FeatureCloud, PriorObject, RestingPose
+from brrp_cli.prior.shard import ARRAYS, StoredObject
+
+
+def pack(item: PriorObject, input_sha256: str) -> StoredObject:
+    """As it is stored: clouds joined, features and their normals in half precision."""
+    clouds = list(item.clouds.values())
+    arrays = {
+        "box": np.stack([item.center - _half(item), item.center + _half(item)]),
+        "samples": item.samples,
+        "labels": item.labels,
+        "surface": item.surface,
+        "surface_normals": item.surface_normals,
+        "scales": np.array(list(item.clouds)),
+        "cloud_starts": np.cumsum([0, *(len(cloud.points) for cloud in clouds)]),
+        "cloud_points": np.concatenate([cloud.points for cloud in clouds]),
+        "cloud_normals": np.concatenate([cloud.normals for cloud in clouds]),
+        "cloud_fpfh": np.concatenate([cloud.fpfh for cloud in clouds]),
+        "pose_T": np.stack([pose.T_plane_object for pose in item.poses]),
+        "pose_probability": np.array([pose.probability for pose in item.poses]),
+    }
+    typed = {key: arrays[key].astype(dtype) for key, (dtype, _) in ARRAYS.items()}
+    return StoredObject(item.name, input_sha256, typed, item.record)
+
+
+def _half(item: PriorObject) -> np.ndarray:
+    return np.asarray(item.record["extents"]) / 2
+
+
+def unpack(stored: StoredObject, description: str) -> PriorObject:
+    """As it is used: float64 clouds by scale, unit normals, labels as bool."""
+    arrays = stored.arrays
+    lower, upper = arrays["box"]
+    points, fpfh = (arrays[k].astype(np.float64) for k in ("cloud_points", "cloud_fpfh"))
+    normals = normalise(arrays["cloud_normals"].astype(np.float64))
+    starts = arrays["cloud_starts"]
+    return PriorObject(
+        name=stored.name,
+        description=description,
+        center=(lower + upper) / 2,
+        half_extent=float((upper - lower).max() / 2),
+        samples=arrays["samples"],
+        labels=arrays["labels"].astype(bool),
+        surface=arrays["surface"],
+        surface_normals=arrays["surface_normals"],
+        clouds={
+            float(scale): FeatureCloud(points[a:b], normals[a:b], fpfh[a:b])
+            for scale, a, b in zip(arrays["scales"], starts[:-1], starts[1:], strict=True)
+        },
+        poses=[
+            RestingPose(T, float(p))
+            for T, p in zip(arrays["pose_T"], arrays["pose_probability"], strict=True)
+        ],
+        record=stored.record,
+    )

@@ -1,0 +1,80 @@
+"""What decides the bytes of a prior, apart from the meshes themselves."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
+from typing import Any
+
+from brrp_cli.config import FeatureConfig
+from brrp_cli.errors import PriorError
+
+UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001}
+
+
+@dataclass(frozen=True)
+class SampleMix:
+    """Where labelled samples lie. Lengths are normalised: the object's largest half-extent is 1.
+
+    A share of `uniform` fills the bounding box grown by `margin` on every side; the rest is split
+    evenly over `offsets`: points of the surface moved by Gaussian noise of that standard deviation.
+    """
+
+    uniform: float = 0.5
+    margin: float = 0.25
+    offsets: tuple[float, ...] = (0.1, 0.025)
+
+
+@dataclass(frozen=True)
+class PoseConfig:
+    """Which resting poses are kept."""
+
+    hull_faces: int = 400
+    merge_degrees: float = 10.0
+    min_probability: float = 0.01
+    max_count: int = 12
+
+
+@dataclass(frozen=True)
+class BuildParameters:
+    """All of it. `units`: what one unit of the mesh files is."""
+
+    seed: int = 0
+    units: str = "m"
+    samples: int = 20_000
+    mix: SampleMix = field(default_factory=SampleMix)
+    surface_points: int = 4_000
+    dense_points: int = 20_000
+    features: FeatureConfig = field(default_factory=FeatureConfig)
+    poses: PoseConfig = field(default_factory=PoseConfig)
+
+    def as_dict(self) -> dict[str, Any]:
+        """As JSON gives it back: tuples are lists."""
+        plain: dict[str, Any] = json.loads(json.dumps(asdict(self)))
+        return plain
+
+
+def differences(old: Mapping[str, Any], new: Mapping[str, Any], prefix: str = "") -> list[str]:
+    """One line, `name: old -> new`, for each value in which two parameter tables differ."""
+    lines = []
+    for key in sorted({*old, *new}):
+        before, after = old.get(key), new.get(key)
+        if isinstance(before, Mapping) and isinstance(after, Mapping):
+            lines += differences(before, after, f"{prefix}{key}.")
+        elif before != after:
+            lines.append(f"{prefix}{key}: {json.dumps(before)} -> {json.dumps(after)}")
+    return lines
+
+
+def refuse_differences(old: Mapping[str, Any], new: Mapping[str, Any], where: object) -> None:
+    """PriorError that names what differs, if anything does."""
+    lines = differences(old, new)
+    if lines:
+        raise PriorError(
+            "The prior there was built with other parameters",
+            where=where,
+            found="; ".join(lines),
+            fix="use the same parameters, choose another folder with -o, or rebuild all of it "
+            "with --overwrite",
+        )
