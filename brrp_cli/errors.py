@@ -65,6 +65,10 @@ class FrameError(BrrpError):
     """A frame, or what is to become one, cannot be used."""
 
 
+class SceneError(BrrpError):
+    """A scene to evaluate on, or its ground truth, cannot be used."""
+
+
 class MeshError(BrrpError):
     """A mesh cannot become an object of the prior."""
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from brrp_cli.config import ObservationConfig
 from brrp_cli.dependencies import import_open3d
-from brrp_cli.seeds import child_rng, child_seed
+from brrp_cli.seeds import child_seed
 
 MIN_PLANE_POINTS = 100
 _RANSAC_POINTS = 20_000
@@ -48,24 +48,38 @@ def fit_plane(
     if len(near) < MIN_PLANE_POINTS:
         return None
     centred = near.astype(np.float64) - toward
-    drawn = centred
-    if len(centred) > _RANSAC_POINTS:
-        rows = child_rng(seed, "plane", "points").choice(len(centred), _RANSAC_POINTS, False)
-        drawn = centred[rows]
+    model = largest_plane(
+        centred, config.plane_tolerance, config.plane_iterations, child_seed(seed, "plane")
+    )
+    if model is None:
+        return None
+    if model[3] < 0:  # the scene's centre is the origin here
+        model = -model
+    return Plane(normal=model[:3].copy(), offset=float(model[3] - model[:3] @ toward))
+
+
+def largest_plane(
+    points: NDArray[np.float64], tolerance: float, iterations: int, seed: int
+) -> NDArray[np.float64] | None:
+    """The plane (4,) a x + b y + c z + d = 0, unit normal, near which most of points (n, 3) lie.
+
+    RANSAC (on `_RANSAC_POINTS` drawn points at most), then least squares on all inliers. None
+    where fewer than `MIN_PLANE_POINTS` points are nearer than `tolerance`.
+    """
+    drawn = points
+    if len(points) > _RANSAC_POINTS:
+        drawn = points[np.random.default_rng(seed).choice(len(points), _RANSAC_POINTS, False)]
     o3d = import_open3d()
     cloud = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(drawn))
-    o3d.utility.random.seed(child_seed(seed, "plane"))
-    model, _ = cloud.segment_plane(
-        config.plane_tolerance, ransac_n=3, num_iterations=config.plane_iterations
-    )
+    o3d.utility.random.seed(seed)
+    model, _ = cloud.segment_plane(tolerance, ransac_n=3, num_iterations=iterations)
+    model = np.asarray(model) / np.linalg.norm(model[:3])
     for _ in range(2):
-        inliers = centred[np.abs(centred @ model[:3] + model[3]) < config.plane_tolerance]
+        inliers = points[np.abs(points @ model[:3] + model[3]) < tolerance]
         if len(inliers) < MIN_PLANE_POINTS:
             return None
         middle = inliers.mean(axis=0)
         spread = inliers - middle
         normal = np.linalg.eigh(spread.T @ spread)[1][:, 0]
         model = np.append(normal, -normal @ middle)
-    if model[3] < 0:  # the scene's centre is the origin here
-        model = -model
-    return Plane(normal=model[:3].copy(), offset=float(model[3] - model[:3] @ toward))
+    return model

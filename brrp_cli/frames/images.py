@@ -1,0 +1,69 @@
+"""A frame from colour and depth images with an intrinsics file."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from brrp_cli.errors import FrameError
+from brrp_cli.frames.build import make_frame
+from brrp_cli.frames.frame import Frame
+from brrp_cli.frames.intrinsics import Intrinsics, read_intrinsics
+from brrp_cli.frames.pixels import read_colour, read_depth, read_masks
+
+# What makers of intrinsics files write for millimetres: metres (RealSense), millimetres (BOP),
+# units to the metre.
+_MILLIMETRES = (0.001, 1.0, 1000.0)
+
+
+def read_images(
+    color: str | Path,
+    depth: str | Path,
+    intrinsics: str | Path,
+    masks: str | Path | None = None,
+    *,
+    depth_scale: float | None = None,
+) -> Frame:
+    """Read images of one camera at one resolution, the depth aligned to the colour.
+
+    color : PNG or JPEG; depth : 16-bit PNG, TIFF or .npy (integers are millimetres and floats
+    metres unless `depth_scale` is given); intrinsics : JSON, see `read_intrinsics`; masks : image
+    or .npy of object ids, None = no masks yet.
+
+    Errors: FrameError, also where the sizes disagree.
+    """
+    color, depth, intrinsics = Path(color), Path(depth), Path(intrinsics)
+    camera = read_intrinsics(intrinsics)
+    rgb, raw = read_colour(color), read_depth(depth)
+    ids = None if masks is None else read_masks(Path(masks))
+    shape = rgb.shape[:2]
+    _same_size(shape, raw.shape[:2], depth)
+    if ids is not None:
+        _same_size(shape, ids.shape[:2], Path(masks or ""))
+    if camera.shape is not None:
+        _same_size(shape, camera.shape, intrinsics)
+    if depth_scale is None and raw.dtype.kind in "iu":
+        _millimetres(camera, intrinsics)
+    return make_frame(rgb, ids, depth=raw, K=camera.K, depth_scale=depth_scale, source=depth)
+
+
+def _same_size(color: tuple[int, ...], other: tuple[int, ...], path: Path) -> None:
+    if color != other:
+        raise FrameError(
+            "The sizes disagree",
+            where=path,
+            expected=f"{color[1]} x {color[0]} (width x height), the colour image's size",
+            found=f"{other[1]} x {other[0]}" if len(other) == 2 else other,
+            fix="align depth and masks to the colour camera, and take that camera's intrinsics",
+        )
+
+
+def _millimetres(camera: Intrinsics, path: Path) -> None:
+    if camera.depth_scale is not None and camera.depth_scale not in _MILLIMETRES:
+        raise FrameError(
+            "The intrinsics hold a depth_scale whose unit they do not tell",
+            where=path,
+            expected="--depth-scale: how many metres one unit of depth is",
+            found=f"depth_scale {camera.depth_scale:g}",
+            fix=f"--depth-scale {camera.depth_scale:g} if it is in metres (RealSense),"
+            f" --depth-scale {camera.depth_scale / 1000:g} if it is in millimetres (BOP)",
+        )

@@ -1,0 +1,71 @@
+"""A picture of the masks."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image, ImageDraw, ImageFont
+
+from brrp_cli.frames.frame import BACKGROUND
+
+# Okabe and Ito's colours, which people with any colour vision can tell apart.
+PALETTE = np.array(
+    [
+        (230, 159, 0),
+        (86, 180, 233),
+        (0, 158, 115),
+        (240, 228, 66),
+        (0, 114, 178),
+        (213, 94, 0),
+        (204, 121, 167),
+    ],
+    dtype=np.uint8,
+)
+_FILL = 0.45
+
+
+def object_colours(object_ids: list[int]) -> dict[int, NDArray[np.uint8]]:
+    """A colour (3,) uint8 for each id, by its place in the list."""
+    return {i: PALETTE[place % len(PALETTE)] for place, i in enumerate(object_ids)}
+
+
+def draw_masks(rgb: NDArray[np.uint8], segmap: NDArray[np.integer]) -> NDArray[np.uint8]:
+    """The image (H, W, 3) with each object filled, outlined and named by its id.
+
+    rgb : (H, W, 3) uint8; segmap : (H, W), 0 = background. Neither is changed.
+    """
+    picture = rgb.copy()
+    ids = [int(i) for i in np.unique(segmap) if i != BACKGROUND]
+    for object_id, colour in object_colours(ids).items():
+        mask = segmap == object_id
+        mixed = (1 - _FILL) * rgb[mask] + _FILL * colour
+        picture[mask] = mixed.astype(np.uint8)
+        picture[_outline(mask)] = colour
+    image = Image.fromarray(picture)
+    draw = ImageDraw.Draw(image)
+    font = ImageFont.load_default(size=max(12, min(segmap.shape) // 24))
+    for object_id in ids:
+        draw.text(
+            _middle(segmap == object_id),
+            str(object_id),
+            fill="white",
+            font=font,
+            anchor="mm",
+            stroke_width=2,
+            stroke_fill="black",
+        )
+    return np.asarray(image)
+
+
+def _outline(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Pixels of the mask with a neighbour (of four) outside it; the image's border is outside."""
+    padded = np.pad(mask, 1)
+    inner = padded[:-2, 1:-1] & padded[2:, 1:-1] & padded[1:-1, :-2] & padded[1:-1, 2:]
+    return mask & ~inner
+
+
+def _middle(mask: NDArray[np.bool_]) -> tuple[float, float]:
+    """(u, v) of the mask's pixel nearest to its centroid, so that the label lies on the object."""
+    v, u = np.nonzero(mask)
+    nearest = int(np.argmin((u - u.mean()) ** 2 + (v - v.mean()) ** 2))
+    return float(u[nearest]), float(v[nearest])

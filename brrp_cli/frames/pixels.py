@@ -1,0 +1,79 @@
+"""Image files to arrays: colour, depth and masks."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image, UnidentifiedImageError
+
+from brrp_cli.errors import FrameError
+from brrp_cli.frames.arrays import check_file, read_npy
+from brrp_cli.frames.build import MAX_PIXELS
+
+# Pillow's modes of one number a pixel that is wide enough for depth.
+_WIDE = ("I;16", "I;16B", "I;16L", "I;16N", "I", "F")
+
+
+def _open(path: Path, mode: str | None) -> tuple[NDArray[Any], str]:
+    check_file(path)
+    try:
+        with Image.open(path) as image:
+            if image.width * image.height > MAX_PIXELS:
+                raise FrameError(
+                    "The image is too large",
+                    where=path,
+                    expected=f"at most {MAX_PIXELS} pixels",
+                    found=f"{image.width} x {image.height}",
+                )
+            return np.asarray(image.convert(mode) if mode else image), image.mode
+    except (UnidentifiedImageError, OSError, SyntaxError, Image.DecompressionBombError) as error:
+        raise FrameError(
+            "The image cannot be read",
+            where=path,
+            expected="a whole PNG, JPEG or TIFF",
+            found=str(error),
+            fix="it is damaged, cut short or not what its name says: write or fetch it again",
+        ) from error
+
+
+def read_colour(path: Path) -> NDArray[np.uint8]:
+    """(H, W, 3) uint8 of an image file. Errors: FrameError."""
+    return _open(path, "RGB")[0].astype(np.uint8)
+
+
+def read_depth(path: Path) -> NDArray[Any]:
+    """(H, W) raw depth of a 16-bit PNG, a TIFF or an .npy file, in the file's own unit.
+
+    Errors: FrameError, also for 8-bit and colour images, which are pictures of depth.
+    """
+    if path.suffix == ".npy":
+        return read_npy(path)
+    depth, mode = _open(path, None)
+    if mode not in _WIDE:
+        raise FrameError(
+            "The depth image is a picture, not depth",
+            where=path,
+            expected="one 16-bit or float number a pixel",
+            found=f"Pillow mode {mode}",
+            fix="save raw depth as a 16-bit PNG in millimetres, or as .npy",
+        )
+    return depth
+
+
+def read_masks(path: Path) -> NDArray[Any]:
+    """(H, W) object ids of an .npy file or an image of one number (or palette index) a pixel."""
+    if path.suffix == ".npy":
+        return read_npy(path)
+    masks, mode = _open(path, None)
+    if masks.ndim != 2:
+        raise FrameError(
+            "The mask image has colours, not ids",
+            where=path,
+            expected="one number a pixel: 0 = background, any other id is an object",
+            found=f"Pillow mode {mode}",
+            fix="save the ids as an 8-bit or 16-bit grey PNG, or as .npy",
+        )
+    return masks

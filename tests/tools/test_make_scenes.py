@@ -1,0 +1,217 @@
+import json
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+from click.testing import CliRunner
+from PIL import Image
+
+pytest.importorskip("pybullet")
+sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "tools"))
+
+from make_scenes import main
+from tabletop.models import find_meshes, load_model
+from tabletop.render import FAR, NEAR, perspective
+from tabletop.scene import Plan, make_scene, noisy_buffer
+from tabletop.settle import drop
+
+from brrp_cli.errors import MeshError
+from brrp_cli.evaluation.scenes import find_scenes, true_mesh
+from brrp_cli.geometry import transform_points
+
+SIZE = "160x120"
+
+
+def write_box(folder, name, extents, shift, color):
+    """A textured box in YCB's layout whose origin lies far from its centre."""
+    box = trimesh.creation.box(extents)
+    box.apply_translation(shift)
+    uv = np.full((len(box.vertices), 2), 0.5)
+    material = trimesh.visual.material.SimpleMaterial(image=Image.new("RGB", (8, 8), color))
+    box.visual = trimesh.visual.TextureVisuals(uv=uv, material=material)
+    path = folder / name / "google_16k" / "textured.obj"
+    path.parent.mkdir(parents=True)
+    box.export(path)
+
+
+@pytest.fixture(scope="module")
+def data(tmp_path_factory):
+    root = tmp_path_factory.mktemp("data")
+    write_box(root / "meshes", "001_red", (0.08, 0.06, 0.05), (0.3, 0, 0.1), (255, 0, 0))
+    write_box(root / "meshes", "002_blue", (0.04, 0.04, 0.12), (0, -0.2, 0), (0, 0, 255))
+    return root
+
+
+def generate(data, output, *options):
+    arguments = ["--meshes", data / "meshes", "--size", SIZE, "-o", output, *options]
+    return CliRunner().invoke(main, [str(a) for a in arguments])
+
+
+@pytest.fixture(scope="module")
+def made(data):
+    result = generate(data, data / "scenes", "--scenes", 2)
+    assert result.exit_code == 0, result.output
+    return data / "scenes"
+
+
+def copy_of(made, target):
+    import shutil
+
+    return Path(shutil.copytree(made, target))
+
+
+def bytes_of(folder):
+    return {p.relative_to(folder): p.read_bytes() for p in folder.rglob("*") if p.is_file()}
+
+
+def test_layout_is_the_published_one(made):
+    assert sorted(p.name for p in made.iterdir()) == ["00000000", "00000001"]
+    entries = json.loads((made / "00000000" / "objects.json").read_text())
+    assert 3 <= len(entries) <= 10
+    for entry in entries:
+        assert set(entry) == {"id", "mesh_path", "position", "orientation", "scale"}
+        assert (len(entry["position"]), len(entry["orientation"])) == (3, 4)
+        assert entry["mesh_path"].startswith("meshes/00")
+    for view in ("0000", "0001"):
+        folder = made / "00000000" / view
+        depth, ids = np.load(folder / "depth.npy"), np.load(folder / "seg_mask.npy")
+        assert (depth.shape, depth.dtype, depth.max() <= 1) == ((120, 160), np.float32, True)
+        assert ids.shape == (120, 160)
+        assert ids.dtype.kind == "i"
+        assert set(np.unique(ids)) <= {0} | {entry["id"] for entry in entries}
+        assert Image.open(folder / "rgb.jpg").size == (160, 120)
+        with np.load(folder / "camera.npz") as camera:
+            assert {k: camera[k].shape for k in camera} == {
+                "projection_matrix": (4, 4),
+                "view_matrix": (4, 4),
+            }
+
+
+def test_a_scene_depends_on_seed_and_number_alone(data, made):
+    meshes = tuple(find_meshes(data / "meshes"))
+    for seed, folder in ((0, "again"), (1, "other")):
+        plan = Plan(meshes, data, data / folder, seed, 2, "none", (160, 120), False)
+        make_scene(plan, 1, check=False)
+    first = bytes_of(made / "00000001")
+    assert bytes_of(data / "again" / "00000001") == first
+    other = bytes_of(data / "other" / "00000001")
+    for different in (other, bytes_of(made / "00000000")):
+        assert different[Path("objects.json")] != first[Path("objects.json")]
+        assert different[Path("0000/camera.npz")] != first[Path("0000/camera.npz")]
+
+
+def test_frames_show_the_objects_where_they_are(data, made):
+    colors = {"001_red": 0, "002_blue": 2}
+    seen = 0
+    for scene in find_scenes(made):
+        frame = scene.view(0)
+        for object_id in frame.object_ids:
+            truth = scene.object(object_id)
+            points = transform_points(
+                frame.T_world_cam, frame.object_points(object_id).astype(np.float64)
+            )
+            lower, upper = true_mesh(truth, data).bounds
+            assert (points > lower - 1e-4).all()
+            assert (points < upper + 1e-4).all()
+            if len(points) > 100:
+                seen += 1
+                color = np.median(frame.rgb[frame.segmap == object_id], axis=0)
+                assert color.argmax() == colors[truth.name]
+    assert seen >= 4
+
+
+def test_objects_lie_on_the_table(data, made):
+    for path in find_meshes(data / "meshes"):
+        model = load_model(path)
+        for seed in range(4):
+            (pose,) = drop([model], np.random.default_rng(seed))
+            assert pose.apply(model.vertices)[:, 2].min() == pytest.approx(0, abs=0.002)
+    for scene in find_scenes(made):
+        lowest = [true_mesh(o, data).bounds[0, 2] for o in scene.objects]
+        assert min(lowest) == pytest.approx(0, abs=0.002)
+
+
+def test_check_fails_when_a_pose_is_wrong_by_a_centimetre(data, made, tmp_path):
+    scenes = copy_of(made, tmp_path / "scenes")
+    arguments = ["--check", "--data-root", str(data), "-o", str(scenes)]
+    passed = CliRunner().invoke(main, arguments)
+    assert passed.exit_code == 0, passed.output
+    assert "in 4 views checked" in passed.output
+
+    path = scenes / "00000001" / "objects.json"
+    entries = json.loads(path.read_text())
+    seen = np.unique(np.load(path.parent / "0000" / "seg_mask.npy"))[1]
+    moved = next(entry for entry in entries if entry["id"] == seen)
+    moved["position"][2] += 0.01
+    path.write_text(json.dumps(entries))
+    failed = CliRunner().invoke(main, arguments)
+    assert failed.exit_code == 1
+    assert "do not lie on the posed mesh" in failed.output
+    assert f"object {seen} (" in failed.output
+
+
+def test_check_fails_on_an_id_that_is_no_objects(data, made, tmp_path):
+    scenes = copy_of(made, tmp_path / "scenes")
+    path = scenes / "00000000" / "0000" / "seg_mask.npy"
+    ids = np.load(path)
+    ids[0, 0] = 99
+    np.save(path, ids)
+    failed = CliRunner().invoke(main, ["--check", "--data-root", str(data), "-o", str(scenes)])
+    assert failed.exit_code == 1
+    assert "seg_mask.npy" in failed.output
+    assert "99" in failed.output
+
+
+def test_noise_changes_depth_alone(data, made):
+    result = generate(data, data / "noisy", "--scenes", 1, "--noise", "structured-light")
+    assert result.exit_code == 0, result.output
+    clean, noisy = bytes_of(made / "00000000"), bytes_of(data / "noisy" / "00000000")
+    changed = {path.name for path in clean if clean[path] != noisy[path]}
+    assert changed == {"depth.npy"}
+
+
+def test_noisy_buffer_keeps_metres_and_marks_missing_pixels():
+    projection = perspective((64, 48))
+    depth = np.full((48, 64), 0.8)
+    depth[:, 40:] = 0.6
+    depth[:5] = FAR  # nothing there
+    buffer = (FAR / (FAR - NEAR) * (1 - NEAR / depth)).astype(np.float32)
+    noisy = noisy_buffer(buffer, projection, np.random.default_rng(0))
+    metres = FAR * NEAR / (FAR - noisy * (FAR - NEAR))
+    returned = noisy < 1
+    assert not returned[:5].any()
+    assert not returned[6:-1, 39:41].any()  # the depth edge
+    assert returned[8:-2, 45:].all()
+    error = (metres - depth)[returned]
+    assert abs(error.mean()) < 0.001
+    assert 0.0005 < error.std() < 0.005
+
+
+def test_meshes_are_chosen_by_name(data, tmp_path):
+    names = ["030_fork", "065-d_cups", "065_other"]
+    for name in names:
+        trimesh.creation.box((1, 1, 1)).export(tmp_path / f"{name}.ply")
+    assert [p.stem for p in find_meshes(tmp_path)] == names
+    assert [p.stem for p in find_meshes(tmp_path, only=["030", "065-d"])] == names[:2]
+    assert [p.stem for p in find_meshes(tmp_path, skip=["065"])] == names[:2]
+    assert [p.parent.parent.name for p in find_meshes(data / "meshes")] == ["001_red", "002_blue"]
+    with pytest.raises(MeshError, match="3 meshes before"):
+        find_meshes(tmp_path, only=["999"])
+
+
+def test_existing_scenes_are_kept_and_mistakes_are_told(data, made, tmp_path):
+    again = generate(data, made, "--scenes", 1)
+    assert again.exit_code == 1
+    assert "--overwrite" in again.output
+    elsewhere = generate(data, tmp_path / "s", "--data-root", tmp_path)
+    assert elsewhere.exit_code == 2
+    assert "does not lie below --data-root" in elsewhere.output
+    (tmp_path / "bad").mkdir()
+    (tmp_path / "bad" / "flat.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+    bad = CliRunner().invoke(
+        main, ["--meshes", str(tmp_path / "bad"), "-o", str(tmp_path / "s"), "--size", SIZE]
+    )
+    assert bad.exit_code == 1
+    assert "flat.obj" in bad.output

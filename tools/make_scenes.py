@@ -1,0 +1,151 @@
+"""Make procedural tabletop scenes with ground truth, in the layout that `brrp eval` reads.
+
+PyBullet drops 3 to 10 objects on a table, lets them settle and draws colour, depth buffer and ids
+from random views (0.6 to 1 m away, 25 to 60 degrees above the table). A scene depends on the
+meshes, the seed and its number alone. Needs `pip install .[sim]`.
+
+The three sets of the README, and the same scenes as a structured-light camera sees them (`ycb` is
+the folder with YCB's archives unpacked, NNN_name/google_16k/textured.obj):
+
+    UNSEEN=030,031,032,065-b,065-d,072-a,073-e
+    python tools/make_scenes.py --meshes ycb --skip $UNSEEN --scenes 20 -o scenes/prior
+    python tools/make_scenes.py --meshes ycb --only $UNSEEN --scenes 20 -o scenes/unseen
+    python tools/export_random_shapes.py -o random_shapes
+    python tools/make_scenes.py --meshes random_shapes --scenes 20 -o scenes/other
+
+and each with `--noise structured-light -o scenes/..._noise`. Sets to tune on: `--seed 1000`.
+
+Objects collide as convex hulls (tools/tabletop/settle.py says what that means). A pixel without a
+return has depth buffer 1.0, the far plane.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+from concurrent.futures import ProcessPoolExecutor
+from functools import partial
+from multiprocessing import get_context
+from pathlib import Path
+
+import click
+import numpy as np
+from tqdm import tqdm
+
+# The script also runs from a checkout that is not installed.
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+from tabletop.check import Distance, check_scene
+from tabletop.models import find_meshes
+from tabletop.scene import LIMITS, Plan, make_scene
+
+from brrp_cli.dependencies import import_library
+from brrp_cli.errors import BrrpError, SceneError
+
+CHECK_EVERY = 5
+
+
+def _prefixes(_context: click.Context, _option: click.Parameter, value: str) -> tuple[str, ...]:
+    return tuple(part.strip() for part in value.split(",") if part.strip())
+
+
+def _size(_context: click.Context, _option: click.Parameter, value: str) -> tuple[int, int]:
+    width, _, height = value.partition("x")
+    if not (width.isdigit() and height.isdigit() and int(width) > 0 and int(height) > 0):
+        raise click.BadParameter("expected WIDTHxHEIGHT, as in 640x480")
+    return int(width), int(height)
+
+
+@click.command()
+@click.option("--meshes", type=click.Path(path_type=Path), help="Folder of meshes, metres.")
+@click.option("--only", default="", callback=_prefixes, help="Names to take, as in 030,065-b.")
+@click.option("--skip", default="", callback=_prefixes, help="Names to leave out.")
+@click.option(
+    "--data-root",
+    type=click.Path(path_type=Path),
+    help="Mesh paths are relative to it [MESHES/..].",
+)
+@click.option("--scenes", default=20, show_default=True, type=click.IntRange(1))
+@click.option("--views", default=2, show_default=True, type=click.IntRange(1))
+@click.option("--seed", default=0, show_default=True)
+@click.option("--noise", default="none", show_default=True, type=click.Choice(list(LIMITS)))
+@click.option("--size", default="640x480", show_default=True, callback=_size)
+@click.option("--workers", default=1, show_default=True, type=click.IntRange(1))
+@click.option("--overwrite", is_flag=True, help="Replace scenes that are there.")
+@click.option("--check", is_flag=True, help="Only check every scene of OUTPUT; write nothing.")
+@click.option("-o", "--output", required=True, type=click.Path(path_type=Path))
+def main(
+    meshes: Path | None,
+    only: tuple[str, ...],
+    skip: tuple[str, ...],
+    data_root: Path | None,
+    scenes: int,
+    views: int,
+    seed: int,
+    noise: str,
+    size: tuple[int, int],
+    workers: int,
+    overwrite: bool,
+    check: bool,
+    output: Path,
+) -> None:
+    """Make tabletop scenes of MESHES in OUTPUT, and check a fifth of them."""
+    try:
+        if data_root is None:
+            if meshes is None:
+                raise click.UsageError("name the meshes: --meshes, or --data-root with --check")
+            data_root = meshes.absolute().parent
+        data_root = data_root.absolute()
+        if check:
+            _report(_check_all(output, data_root, noise), output)
+            return
+        if meshes is None:
+            raise click.UsageError("--meshes is needed to make scenes")
+        import_library("pybullet")
+        found = tuple(path.absolute() for path in find_meshes(meshes, only, skip))
+        if not found[0].is_relative_to(data_root):
+            raise click.UsageError(f"{meshes} does not lie below --data-root {data_root}")
+        plan = Plan(found, data_root, output, seed, views, noise, size, overwrite)
+        _report(list(_make_all(plan, scenes, workers)), output)
+    except BrrpError as error:
+        raise click.ClickException(str(error)) from error
+
+
+def _make_all(plan: Plan, scenes: int, workers: int) -> Iterator[Distance]:
+    numbers = range(scenes)
+    checks = [number % CHECK_EVERY == 0 for number in numbers]
+    make = partial(make_scene, plan)
+    if workers == 1:
+        done = map(make, numbers, checks)
+        for distances in tqdm(done, total=scenes, desc="scenes"):
+            yield from distances
+        return
+    # Fresh processes: PyBullet and Open3D do not survive a fork with their threads running.
+    with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
+        for distances in tqdm(pool.map(make, numbers, checks), total=scenes, desc="scenes"):
+            yield from distances
+
+
+def _check_all(output: Path, data_root: Path, noise: str) -> list[Distance]:
+    folders = sorted(path.parent for path in output.glob("*/objects.json"))
+    if not folders:
+        raise SceneError("No scene to check", where=output, expected="NNNNNNNN/objects.json")
+    return [
+        distance
+        for folder in tqdm(folders, desc="check")
+        for distance in check_scene(folder, data_root, LIMITS[noise])
+    ]
+
+
+def _report(distances: list[Distance], output: Path) -> None:
+    medians = np.array([d.median for d in distances]) * 1000
+    highs = np.array([d.percentile95 for d in distances]) * 1000
+    click.echo(
+        f"{output}: {len(distances)} objects in {len({d.view for d in distances})} views checked;"
+        f" distance of pixels to the posed mesh, mm: median {np.median(medians):.3f}"
+        f" (worst {medians.max():.3f}), 95 % {np.median(highs):.3f} (worst {highs.max():.3f})"
+    )
+
+
+if __name__ == "__main__":
+    main()

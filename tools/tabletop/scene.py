@@ -1,0 +1,127 @@
+"""One scene from a seed and a number, written in the published layout."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brrp_cli.errors import SceneError
+from brrp_cli.files import atomic_folder
+from brrp_cli.frames.noise import add_depth_noise
+from brrp_cli.frames.published import depth_from_buffer, intrinsics_from_projection
+from brrp_cli.seeds import child_rng
+from tabletop.check import CLEAN, STRUCTURED_LIGHT, Distance, check_scene
+from tabletop.models import Model, load_model
+from tabletop.render import FAR, NEAR, NOTHING, Camera, Picture, draw_camera, draw_look, render
+from tabletop.settle import Pose, drop
+
+FEWEST, MOST = 3, 10
+MAX_DRAWS = 20
+LIMITS = {"none": CLEAN, "structured-light": STRUCTURED_LIGHT}
+JPEG_QUALITY = 95
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What all scenes of a set share. `noise`: a key of `LIMITS`; `size`: (width, height)."""
+
+    meshes: tuple[Path, ...]
+    data_root: Path
+    output: Path
+    seed: int
+    views: int
+    noise: str
+    size: tuple[int, int]
+    overwrite: bool
+
+
+def make_scene(plan: Plan, number: int, check: bool) -> list[Distance]:
+    """Write scene `number`; it depends on the plan's meshes and seed and on the number alone.
+
+    Noise has random numbers of its own, so that the noisy set shows the scenes of the clean one.
+
+    Errors: SceneError if the check fails or no draw leaves enough objects on the table.
+    """
+    paths, models, poses = draw_objects(plan.meshes, plan.seed, number)
+    rng = child_rng(plan.seed, "scene", number, "views")
+    look = draw_look(len(models), rng)
+    centers = [pose.apply(model.center[None])[0] for pose, model in zip(poses, models, strict=True)]
+    cameras = [draw_camera(np.mean(centers, axis=0), plan.size, rng) for _ in range(plan.views)]
+    pictures = render(models, poses, look, cameras, plan.size)
+    folder = plan.output / f"{number:08d}"
+    with atomic_folder(folder, overwrite=plan.overwrite) as partial:
+        entries = [
+            {
+                "id": i + 1,
+                "mesh_path": path.relative_to(plan.data_root).as_posix(),
+                "position": pose.position.tolist(),
+                "orientation": pose.orientation.tolist(),
+                "scale": 1.0,
+            }
+            for i, (path, pose) in enumerate(zip(paths, poses, strict=True))
+        ]
+        (partial / "objects.json").write_text(json.dumps(entries, indent=2) + "\n")
+        for i, (camera, picture) in enumerate(zip(cameras, pictures, strict=True)):
+            depth = picture.depth
+            if plan.noise != "none":
+                noise_rng = child_rng(plan.seed, "scene", number, "noise", i)
+                depth = noisy_buffer(depth, camera.projection, noise_rng)
+            write_view(partial / f"{i:04d}", picture, depth, camera)
+        return check_scene(partial, plan.data_root, LIMITS[plan.noise]) if check else []
+
+
+def draw_objects(
+    meshes: tuple[Path, ...], seed: int, number: int
+) -> tuple[list[Path], list[Model], list[Pose]]:
+    """Three to ten objects that lie still on the table; drawn again until there are three.
+
+    A mesh comes twice only where there are fewer meshes than objects.
+    """
+    for attempt in range(MAX_DRAWS):
+        rng = child_rng(seed, "scene", number, "objects", attempt)
+        count = int(rng.integers(FEWEST, MOST + 1))
+        order = np.concatenate(
+            [rng.permutation(len(meshes)) for _ in range(-(-count // len(meshes)))]
+        )
+        paths = [meshes[i] for i in order[:count]]
+        models = [load_model(path) for path in paths]
+        kept = [
+            (path, model, pose)
+            for path, model, pose in zip(paths, models, drop(models, rng), strict=True)
+            if pose is not None
+        ]
+        if len(kept) >= FEWEST:
+            return [k[0] for k in kept], [k[1] for k in kept], [k[2] for k in kept]
+    raise SceneError(
+        f"No draw leaves {FEWEST} objects at rest on the table",
+        where=f"scene {number}, seed {seed}",
+        found=f"{MAX_DRAWS} draws",
+        fix="meshes must be in metres, and smaller than the table (1.5 m)",
+    )
+
+
+def noisy_buffer(
+    buffer: NDArray[np.float32], projection: NDArray[np.float64], rng: np.random.Generator
+) -> NDArray[np.float32]:
+    """The depth buffer of a structured-light camera; a pixel without return is on the far plane."""
+    clean = np.nan_to_num(depth_from_buffer(buffer, projection))
+    K = intrinsics_from_projection(projection, buffer.shape)
+    depth = add_depth_noise(clean, K, rng).astype(np.float64)
+    returned = depth > NEAR
+    noisy = FAR / (FAR - NEAR) * (1 - NEAR / np.where(returned, depth, 1.0))
+    return np.where(returned & (noisy < 1), noisy, NOTHING).astype(np.float32)
+
+
+def write_view(folder: Path, picture: Picture, depth: NDArray[np.float32], camera: Camera) -> None:
+    """One view in the published layout."""
+    from PIL import Image
+
+    folder.mkdir()
+    Image.fromarray(picture.rgb).save(folder / "rgb.jpg", quality=JPEG_QUALITY)
+    np.save(folder / "depth.npy", depth)
+    np.save(folder / "seg_mask.npy", picture.ids)
+    np.savez(folder / "camera.npz", projection_matrix=camera.projection, view_matrix=camera.view)
