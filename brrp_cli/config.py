@@ -110,3 +110,30 @@ def preset(name: str) -> Config:
     if name not in PRESETS:
         raise BrrpError("No such preset", found=name, expected=", ".join(PRESETS))
     return PRESETS[name]
+
+
+def _vprism_observation() -> ObservationConfig:
+    return ObservationConfig(
+        ray_bin=0.1, ray_radius=0.25, plane_radius=0.4, below_draws=1000, below_radius=0.25
+    )
+
+
+@dataclass(frozen=True)
+class VPrismConfig:
+    """The V-PRISM baseline (Wright et al. 2024, arXiv 2403.08106), as its authors ran it.
+
+    `gamma` is of the kernel exp(-gamma |x - h|^2), 1 / m^2. Two values are not theirs:
+    `feature_floor`, under which a feature counts as 0, and `half_width` of the box around an
+    object's centre outside of which its occupancy is 0.
+    """
+
+    observation: ObservationConfig = field(default_factory=_vprism_observation)
+    hinge_spacing: float = 0.05
+    hinge_radius: float = 0.15
+    surface_hinges: int = 32
+    gamma: float = 1000.0
+    feature_floor: float = 1e-7
+    prior_variance: float = 1e4
+    iterations: int = 3
+    max_update_points: int = 20_000
+    half_width: float = 0.2

@@ -53,7 +53,7 @@ def observe(frame: Frame, config: ObservationConfig, seed: int) -> SceneObservat
     """Sample the frame around each of its objects. The same seed gives the same bytes."""
     points = {i: frame.object_points(i) for i in frame.object_ids}
     too_few = {i: len(p) for i, p in points.items() if len(p) < config.min_points}
-    centers = {i: _box_center(p) for i, p in points.items() if i not in too_few}
+    centers = {i: box_center(p) for i, p in points.items() if i not in too_few}
     if not centers:
         return SceneObservation(plane=None, objects={}, too_few=too_few)
 
@@ -137,7 +137,8 @@ def below_samples(
     return below
 
 
-def _box_center(points: NDArray[np.float32]) -> NDArray[np.float64]:
+def box_center(points: NDArray[np.float32]) -> NDArray[np.float64]:
+    """Middle (3,) of the bounding box of points (n, 3)."""
     return (points.min(axis=0).astype(np.float64) + points.max(axis=0)) / 2
 
 

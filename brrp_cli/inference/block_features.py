@@ -9,6 +9,7 @@ Phi then costs what the neighbourhood costs, not what the scene costs, and runs 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -45,11 +46,21 @@ class Block:
     """Rows and columns of Phi outside of which nothing in these rows is non-zero.
 
     rows : (n,) int; columns : (a,) int, ascending, the bias last; values : (n, a) float64
+    size : number of columns of Phi
     """
 
     rows: NDArray[np.intp]
     columns: NDArray[np.intp]
     values: Floats
+    size: int
+
+    @cached_property
+    def square(self) -> NDArray[np.intp]:
+        """Places (a, a) of columns x columns in a flattened (size, size) matrix.
+
+        NumPy gathers and scatters by one flat index several times faster than by two.
+        """
+        return self.columns[:, None] * self.size + self.columns
 
 
 @dataclass(frozen=True)
@@ -61,12 +72,14 @@ class BlockFeatures:
     blocks: list[Block]
 
     def gram(self, weights: Floats) -> Floats:
-        """Phi^T diag(weights) Phi, (size, size), of weights (n,)."""
-        total = np.zeros((self.size, self.size))
+        """Phi^T diag(weights) Phi, (size, size), of weights (n,), none negative."""
+        root = np.sqrt(weights)
+        total = np.zeros(self.size**2)
         for block in self.blocks:
-            weighted = block.values * weights[block.rows, None]
-            total[np.ix_(block.columns, block.columns)] += weighted.T @ block.values
-        return total
+            # One array times its own transpose: NumPy computes half of it and mirrors.
+            weighted = block.values * root[block.rows, None]
+            total[block.square] += weighted.T @ weighted
+        return total.reshape(self.size, self.size)
 
     def transpose_dot(self, values: Floats) -> Floats:
         """Phi^T values, (size,), of values (n,)."""
@@ -86,7 +99,7 @@ class BlockFeatures:
         """phi_i^T matrix phi_i, (n,), of a matrix (size, size)."""
         result = np.empty(self.n)
         for block in self.blocks:
-            near = matrix[np.ix_(block.columns, block.columns)]
+            near = matrix.take(block.square)
             result[block.rows] = np.einsum("ij,ij->i", block.values @ near, block.values)
         return result
 
@@ -122,4 +135,5 @@ def _block(
         rows=rows,
         columns=np.append(near, basis.size - 1),
         values=np.column_stack([values, np.ones(len(rows))]),
+        size=basis.size,
     )

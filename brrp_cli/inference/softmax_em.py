@@ -80,7 +80,9 @@ def update(
         curvature = jaakkola_lambda(xi)
         last = iteration == iterations - 1
         for k in range(classes):
-            np.add(prior.precision[k], features.gram(2 * curvature[k]), out=precision[k])
+            if k == 0 or iteration > 0:  # at first all classes have the same curvature
+                gram = features.gram(2 * curvature[k])
+            np.add(prior.precision[k], gram, out=precision[k])
             shift[k] = prior.shift[k] + features.transpose_dot(
                 targets[k] + 2 * offset * curvature[k]
             )

@@ -13,7 +13,9 @@ from brrp_cli.inference.softmax_em import isotropic_prior, jaakkola_lambda, mome
 def as_features(phi):
     """A dense matrix as one block."""
     rows, columns = np.arange(phi.shape[0]), np.arange(phi.shape[1])
-    return BlockFeatures(n=len(phi), size=phi.shape[1], blocks=[Block(rows, columns, phi)])
+    return BlockFeatures(
+        n=len(phi), size=phi.shape[1], blocks=[Block(rows, columns, phi, phi.shape[1])]
+    )
 
 
 def class_moments(weights):
