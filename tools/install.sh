@@ -41,13 +41,14 @@ libgomp.so.1 libgomp1
 LIBRARIES
 
 if [ "${#missing[@]}" -gt 0 ]; then
-    echo "Installing system packages that this machine lacks: ${missing[*]}" >&2
+    echo "System packages that this machine lacks: ${missing[*]}" >&2
     as_root=()
     [ "$(id -u)" -eq 0 ] || as_root=(sudo)
     install=(apt-get install -y --no-install-recommends "${missing[@]}")
-    { "${as_root[@]}" apt-get update -qq && "${as_root[@]}" "${install[@]}" -qq >/dev/null; } ||
-        fail "System packages are missing: ${missing[*]}" \
-            "have an administrator run: ${install[*]}; then run this again"
+    { type apt-get "${as_root[@]}" 2>/dev/null && "${as_root[@]}" apt-get update -qq &&
+        "${as_root[@]}" "${install[@]}" -qq; } >/dev/null ||
+        fail "The missing system packages could not be installed" \
+            "have an administrator run: apt-get update && ${install[*]}; then run this again"
 fi
 
 # What an older checkout left in build/ would be packed into the new installation.

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
-from brrp_cli.frames.frame import BACKGROUND
+from brrp_cli.files import atomic_path
+from brrp_cli.frames.frame import BACKGROUND, Frame
 
 # Okabe and Ito's colours, which people with any colour vision can tell apart.
 PALETTE = np.array(
@@ -55,6 +58,12 @@ def draw_masks(rgb: NDArray[np.uint8], segmap: NDArray[np.integer]) -> NDArray[n
             stroke_fill="black",
         )
     return np.asarray(image)
+
+
+def write_picture(frame: Frame, path: Path) -> None:
+    """Write `draw_masks` of the frame as an image file. Errors: OutputError."""
+    with atomic_path(path) as partial:
+        Image.fromarray(draw_masks(frame.rgb, frame.segmap)).save(partial)
 
 
 def _outline(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:

@@ -12,7 +12,7 @@ from brrp_cli.dependencies import import_open3d
 from brrp_cli.seeds import child_seed
 
 MIN_PLANE_POINTS = 100
-_RANSAC_POINTS = 20_000
+_RANSAC_POINTS = 8_000
 
 
 @dataclass(frozen=True)

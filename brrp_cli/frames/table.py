@@ -14,8 +14,9 @@ from brrp_cli.seeds import child_rng, child_seed
 
 _DRAWN = 40_000
 _TOLERANCE = 0.01
-_CANDIDATES = 4
+_CANDIDATES = 3
 _PARALLEL = np.cos(np.radians(10))
+_TABLE_HEIGHT = 0.2
 _CELL = 0.02
 
 
@@ -61,8 +62,8 @@ def find_table(points: NDArray[np.floating], seed: int, source: object = None) -
     """The support plane of points (n, 3), metres, camera frame.
 
     The planes with most points are found one after the other (RANSAC). The table is the largest,
-    or, where a floor is larger, the nearest plane above it that is parallel to it and a quarter
-    of its size.
+    or, where a floor is larger, a plane that lies well above it, is parallel to it and has a
+    quarter of its points.
 
     Errors: FrameError if no plane holds a twentieth of the points.
     """
@@ -77,13 +78,7 @@ def find_table(points: NDArray[np.floating], seed: int, source: object = None) -
             found="no plane with a twentieth of the points",
             fix="take the picture so that more of the table is seen, or pass masks with --masks",
         )
-    largest, size = planes[0]
-    parallel = [
-        plane
-        for plane, count in planes
-        if plane.normal @ largest.normal > _PARALLEL and count >= size / 4
-    ]
-    plane = min(parallel, key=lambda plane: plane.offset)  # the camera's height above it
+    plane = _above_the_floor(planes)
     axes = np.linalg.svd(plane.normal[None])[2][1:]
     on = (points @ axes.T)[np.abs(plane.signed_distance(points)) < _TOLERANCE]
     hull = convex_hull(_largest_patch(on))
@@ -110,6 +105,18 @@ def _largest_planes(points: NDArray[np.float64], seed: int) -> list[tuple[Plane,
         planes.append((plane, int(inlier.sum())))
         rest = rest[~inlier]
     return sorted(planes, key=lambda pair: -pair[1])
+
+
+def _above_the_floor(planes: list[tuple[Plane, int]]) -> Plane:
+    largest, size = planes[0]
+    table = largest
+    for plane, count in planes[1:]:
+        parallel = plane.normal @ largest.normal > _PARALLEL
+        # Offsets are the camera's heights above the planes. What rises less than a table's legs
+        # are long is the tops of things on the table.
+        if parallel and count >= size / 4 and table.offset - plane.offset > _TABLE_HEIGHT:
+            table = plane
+    return table
 
 
 def _largest_patch(plan: NDArray[np.float64]) -> NDArray[np.float64]:
