@@ -19,7 +19,7 @@ from brrp_cli.inference.block_features import KernelBasis
 from brrp_cli.inference.expected_softmax import expected_softmax
 from brrp_cli.inference.scene_hinges import scene_hinges
 from brrp_cli.inference.softmax_map import SoftmaxMap, fit_softmax_map
-from brrp_cli.methods.base import OK, TOO_FEW_POINTS, ObjectReconstruction
+from brrp_cli.methods.base import OK, TOO_FEW_POINTS, Axes, ObjectReconstruction
 from brrp_cli.seeds import child_rng
 
 
@@ -43,6 +43,11 @@ class VPrismPosterior:
         result[inside] = expected_softmax(mean, variance, self.label)
         return result
 
+    def probability_volume(self, axes: Axes) -> NDArray[np.float32]:
+        """`probability` (nx, ny, nz) on a lattice of camera-frame coordinates, metres."""
+        nodes = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
+        return self.probability(nodes.reshape(-1, 3)).reshape(nodes.shape[:3])
+
     def uncertainty(self, points: NDArray[np.floating]) -> NDArray[np.float32]:
         """Variance (n,) of this object's logit against that of free space."""
         _, variance = self.scene.logits(points, [FREE, self.label])
@@ -63,8 +68,8 @@ def reconstruct_vprism(frame: Frame, config: VPrismConfig, seed: int) -> list[Ob
         fitted = fit_scene(scene, config, seed)
         count = len(scene.points)
         seconds = {
-            "observe": (observed - start) / count,
-            "infer": (perf_counter() - observed) / count,
+            "observation": (observed - start) / count,
+            "inference": (perf_counter() - observed) / count,
         }
         found += [
             ObjectReconstruction(
@@ -77,7 +82,6 @@ def reconstruct_vprism(frame: Frame, config: VPrismConfig, seed: int) -> list[Ob
                     fitted, label, _box(scene.centers[object_id], config.half_width)
                 ),
                 seconds=dict(seconds),
-                extra={"hinges": len(fitted.basis.hinges), "samples": len(scene.samples)},
             )
             for label, (object_id, points) in enumerate(scene.points.items(), start=FREE + 1)
         ]
