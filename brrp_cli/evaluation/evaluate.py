@@ -14,11 +14,10 @@ from typing import Any
 from brrp_cli.evaluation.bootstrap import ROUNDS
 from brrp_cli.evaluation.folder import PARAMETERS, ROWS, claimed
 from brrp_cli.evaluation.report import write_report
-from brrp_cli.evaluation.rows import Row, RowLog, table
+from brrp_cli.evaluation.rows import METRICS, Row, RowLog, table
 from brrp_cli.evaluation.run import Plan, close_true_meshes, collect, run_missing
 from brrp_cli.evaluation.scenes import Scene, find_scenes
 from brrp_cli.evaluation.summary import (
-    METRICS,
     VariantSummary,
     as_record,
     differences,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import math
 from collections.abc import Sequence
 from pathlib import Path
@@ -146,6 +147,8 @@ def reliability_diagram(summaries: Sequence[VariantSummary], labels: Labels) -> 
 
 def _figure(panels: int, width: float = 6.0) -> tuple[Any, list[Any]]:
     """A figure that needs no screen and no global state."""
+    # On first use it tells how it builds a cache of fonts.
+    logging.getLogger("matplotlib").setLevel(logging.ERROR)
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 

@@ -25,12 +25,15 @@ Row = dict[str, Any]
 
 VARIANT = ("method", "preset", "k", "retriever", "shift")
 OBJECT = ("scene", "view", "object_id", "name", "visible_pixels", "objects_in_view")
+METRICS = (
+    *SHAPE_METRICS,
+    *(f"{metric}_{region}" for region in REGIONS for metric in PROBABILITY_METRICS),
+)
 RESULT = (
     "status",
     "message",
     "points",
-    *SHAPE_METRICS,
-    *(f"{metric}_{region}" for region in REGIONS for metric in PROBABILITY_METRICS),
+    *METRICS,
     "in_prior",
     "true_rank",
     "true_probability",
@@ -54,7 +57,7 @@ class RowLog:
         """Add rows, together, from any process. Errors: OutputError."""
         text = "".join(json.dumps(_plain(row)) + "\n" for row in rows)
         try:
-            with FileLock(f"{self.path}.lock"), self.path.open("ab") as stream:
+            with FileLock(self.path.with_name(".rows.lock")), self.path.open("ab") as stream:
                 stream.write(text.encode())
                 stream.flush()
                 os.fsync(stream.fileno())
@@ -118,5 +121,4 @@ def _plain(row: Row) -> Row:
 
 def _restored(row: Row) -> Row:
     """A metric without a value is NaN again."""
-    numbers = {*RESULT[3:-7], "true_probability", "best_probability", "placement_error", *COST}
-    return {k: math.nan if v is None and k in numbers else v for k, v in row.items()}
+    return {k: math.nan if v is None and k in METRICS else v for k, v in row.items()}

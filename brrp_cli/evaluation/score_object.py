@@ -27,7 +27,7 @@ LEVEL = 0.5
 BINS = 15
 REGIONS = ("near", "occluded")
 SHAPE_METRICS = ("iou", "chamfer", "iou_exact", "chamfer_exact", "iou_5mm", "f_score_1cm")
-PROBABILITY_METRICS = ("brier", "nll", "ause")
+PROBABILITY_METRICS = ("brier", "nll", "ause", "ause_entropy")
 
 
 def score_shape(
@@ -61,7 +61,8 @@ def score_probabilities(
     """Brier score, negative log likelihood and AUSE near the object, over all points and over the
     occluded ones alone; and for each of the two regions the sums of a reliability diagram.
 
-    The error that uncertainty is to rank is the squared difference of probability and truth. A
+    The error that uncertainty is to rank is the squared difference of probability and truth; `ause`
+    ranks by the method's own uncertainty, `ause_entropy` by how close the probability is to 0.5. A
     diagram is three lists over 15 bins: points, sum of their probabilities, occupied points.
     """
     probability = posterior.probability(truth.near)
@@ -76,6 +77,7 @@ def score_probabilities(
         scores[f"brier_{region}"] = brier(p, y)
         scores[f"nll_{region}"] = negative_log_likelihood(p, y)
         scores[f"ause_{region}"] = ause(error[chosen], uncertainty[chosen])
+        scores[f"ause_entropy_{region}"] = ause(error[chosen], (p * (1 - p)).astype(np.float64))
         diagrams[region] = reliability_sums(p, y)
     return scores, diagrams
 

@@ -11,16 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brrp_cli.evaluation.bootstrap import Interval, calibration_interval, mean_interval
-from brrp_cli.evaluation.rows import STAGES, Row, variant_of
-from brrp_cli.evaluation.score_object import PROBABILITY_METRICS, REGIONS, SHAPE_METRICS
+from brrp_cli.evaluation.rows import METRICS, STAGES, Row, variant_of
+from brrp_cli.evaluation.score_object import REGIONS
 from brrp_cli.evaluation.variants import Variant
 from brrp_cli.methods.base import FAILED, TOO_FEW_POINTS
 from brrp_cli.seeds import child_rng
 
-METRICS = (
-    *SHAPE_METRICS,
-    *(f"{metric}_{region}" for region in REGIONS for metric in PROBABILITY_METRICS),
-)
 RETRIEVAL = ("true_first", "true_in_3", "true_probability", "placement_error")
 
 
