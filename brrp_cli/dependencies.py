@@ -5,6 +5,8 @@ from __future__ import annotations
 import ctypes
 import importlib
 import sys
+from contextlib import AbstractContextManager
+from functools import cache
 from types import ModuleType
 from typing import Any
 
@@ -47,3 +49,20 @@ def import_open3d() -> Any:
     o3d = import_library("open3d")
     o3d.utility.set_verbosity_level(o3d.utility.VerbosityLevel.Error)
     return o3d
+
+
+@cache
+def _thread_pools() -> Any:
+    from threadpoolctl import ThreadpoolController
+
+    # Made once: it searches the process for libraries. Open3D must be among them by then.
+    import_open3d()
+    return ThreadpoolController()
+
+
+def one_openmp_thread() -> AbstractContextManager[object]:
+    """Hold OpenMP to one thread: the threads of Open3D's RANSAC take turns at one random stream,
+    and those of its ICP add in the order in which they end, so that a seed is not enough to repeat
+    a result on several."""
+    pools: AbstractContextManager[object] = _thread_pools().limit(limits=1, user_api="openmp")
+    return pools

@@ -35,7 +35,7 @@ from tqdm import tqdm
 # The script also runs from a checkout that is not installed.
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from tabletop.check import Distance, check_scene
+from tabletop.check import MIN_PIXELS, Distance, check_scene
 from tabletop.models import find_meshes
 from tabletop.scene import LIMITS, Plan, make_scene
 
@@ -138,6 +138,12 @@ def _check_all(output: Path, data_root: Path, noise: str) -> list[Distance]:
 
 
 def _report(distances: list[Distance], output: Path) -> None:
+    if not distances:
+        raise SceneError(
+            "Nothing could be checked: no object fills enough pixels",
+            where=output,
+            expected=f"{MIN_PIXELS} pixels of an object",
+        )
     medians = np.array([d.median for d in distances]) * 1000
     highs = np.array([d.percentile95 for d in distances]) * 1000
     click.echo(

@@ -13,7 +13,10 @@ from brrp_cli.errors import FrameError
 
 log = logging.getLogger(__name__)
 
-MAX_RESIDUAL = 2.0  # pixels, median; above it the points are no pinhole image
+# Above these medians points are no pinhole image: pixels, and a share of the image's larger side,
+# without which any cloud would pass for a tiny image.
+MAX_RESIDUAL = 2.0
+_MAX_SHARE = 0.02
 _EXPECTED_K = "[[fx, 0, cx], [0, fy, cy], [0, 0, 1]], pixels, fx and fy > 0"
 
 
@@ -103,7 +106,11 @@ def fit_intrinsics(
             f, c = np.polyfit(ratio, pixel, 1)
         K[axis, axis], K[axis, 2] = f, c
         residuals.append(_residual(ratio, pixel, f, c))
-    if not (max(residuals) <= MAX_RESIDUAL and K[0, 0] > 0 and K[1, 1] > 0):
+    if not (
+        max(residuals) <= min(MAX_RESIDUAL, _MAX_SHARE * max(height, width))
+        and K[0, 0] > 0
+        and K[1, 1] > 0
+    ):
         raise FrameError(
             "xyz is no pinhole camera's image",
             where=source,

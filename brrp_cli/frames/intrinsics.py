@@ -40,15 +40,27 @@ class Intrinsics:
 
 
 def _number(value: object, key: str, path: Path) -> float:
-    if isinstance(value, bool) or not isinstance(value, (int, float)):
+    if isinstance(value, bool) or not isinstance(value, (int, float)) or not np.isfinite(value):
         raise FrameError(
-            "An intrinsic is no number", where=f"{path}: {key}", expected="a number", found=value
+            "An intrinsic is no number",
+            where=f"{path}: {key}",
+            expected="a number",
+            found=repr(value),
         )
     return float(value)
 
 
 def _first(data: dict[str, Any], keys: tuple[str, ...], path: Path) -> float | None:
     return next((_number(data[key], key, path) for key in keys if key in data), None)
+
+
+def _unwrapped(data: Any) -> Any:
+    """What stands under the only key, or under the only key there, unless that key is a matrix."""
+    if isinstance(data, dict) and len(data) == 1:
+        ((key, value),) = data.items()
+        if isinstance(value, dict) and key not in _MATRICES:
+            return _unwrapped(value)
+    return data
 
 
 def _matrix(data: dict[str, Any], path: Path) -> NDArray[np.float64] | None:
@@ -87,8 +99,7 @@ def read_intrinsics(path: Path) -> Intrinsics:
         raise FrameError(
             "The intrinsics are no JSON", where=path, expected=_EXPECTED, found=str(error)
         ) from error
-    while isinstance(data, dict) and len(data) == 1 and isinstance(next(iter(data.values())), dict):
-        (data,) = data.values()
+    data = _unwrapped(data)
     if isinstance(data, list):
         data = {"K": data}
     if not isinstance(data, dict):

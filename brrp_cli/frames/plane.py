@@ -12,7 +12,7 @@ from brrp_cli.dependencies import import_open3d
 from brrp_cli.seeds import child_seed
 
 MIN_PLANE_POINTS = 100
-_RANSAC_POINTS = 8_000
+_RANSAC_POINTS = 4_000
 
 
 @dataclass(frozen=True)
@@ -72,7 +72,10 @@ def largest_plane(
     o3d = import_open3d()
     cloud = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(drawn))
     o3d.utility.random.seed(seed)
-    model, _ = cloud.segment_plane(tolerance, ransac_n=3, num_iterations=iterations)
+    # With probability 1 every iteration is run: stopping early depends on which thread is first.
+    model, _ = cloud.segment_plane(
+        tolerance, ransac_n=3, num_iterations=iterations, probability=1.0
+    )
     model = np.asarray(model) / np.linalg.norm(model[:3])
     for _ in range(2):
         inliers = points[np.abs(points @ model[:3] + model[3]) < tolerance]

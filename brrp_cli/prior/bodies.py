@@ -19,6 +19,11 @@ def is_solid(mesh: trimesh.Trimesh) -> bool:
     return bool(_manifold(mesh).status() == manifold3d.Error.NoError)
 
 
+def is_flat(body: trimesh.Trimesh) -> bool:
+    """Whether a closed body encloses nothing, such as a sheet that lies back to back."""
+    return bool(abs(body.volume) <= 1e-9 * body.area**1.5)
+
+
 def unite_bodies(mesh: trimesh.Trimesh) -> tuple[trimesh.Trimesh, list[str]]:
     """Turn every body of a closed mesh the right way and unite those that overlap.
 
@@ -28,8 +33,9 @@ def unite_bodies(mesh: trimesh.Trimesh) -> tuple[trimesh.Trimesh, list[str]]:
     """
     import manifold3d
 
-    parts = list(mesh.split(only_watertight=False))
-    if len(parts) <= 1:
+    bodies = list(mesh.split(only_watertight=False))
+    parts = [body for body in bodies if not is_flat(body)]
+    if len(bodies) == 1 or not parts:
         if mesh.volume < 0:
             mesh = mesh.copy()
             mesh.invert()
@@ -51,11 +57,14 @@ def unite_bodies(mesh: trimesh.Trimesh) -> tuple[trimesh.Trimesh, list[str]]:
     )
     separate = sum(part.volume for part in outward)
     overlap = separate - solid.volume()
-    if not turned and overlap <= 1e-9 * separate:
+    flat = len(bodies) - len(parts)
+    if not turned and not flat and overlap <= 1e-9 * separate:
         return mesh, []
     for part in cavities:
         solid -= _manifold(part)
-    steps = [f"turned {turned} bodies outward"] if turned else []
+    steps = [f"dropped {flat} bodies without volume"] if flat else []
+    if turned:
+        steps.append(f"turned {turned} bodies outward")
     if overlap > 1e-9 * separate:
         steps.append(f"united {len(outward)} overlapping bodies")
     return _trimesh(solid), steps
@@ -76,8 +85,8 @@ def _manifold(mesh: trimesh.Trimesh):  # type: ignore[no-untyped-def]
 
     return manifold3d.Manifold(
         manifold3d.Mesh64(
-            np.ascontiguousarray(mesh.vertices, dtype=np.float64),
-            np.ascontiguousarray(mesh.faces, dtype=np.uint64),
+            np.array(mesh.vertices, dtype=np.float64, order="C"),
+            np.array(mesh.faces, dtype=np.uint64, order="C"),
         )
     )
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-from brrp_cli.errors import PriorError
 from brrp_cli.prior.manifest import FILE
 from brrp_cli.version import __version__
 
@@ -41,9 +40,8 @@ def output_prior(explicit: Path | None) -> tuple[Path, str]:
 def locate_prior(explicit: Path | None) -> tuple[Path, str]:
     """Folder of the prior to read, and where that name comes from.
 
-    --prior, else BRRP_PRIOR, else the user's data folder, else the starter prior. A prior that was
-    named is taken whether it is there or not: opening it tells. Errors: PriorError when nothing
-    was named and nothing was built yet.
+    --prior, else BRRP_PRIOR, else the user's data folder, else the starter prior, which is built
+    on first use. A prior that was named is taken whether it is there or not: opening it tells.
     """
     if explicit is not None:
         return explicit, "as given"
@@ -51,11 +49,6 @@ def locate_prior(explicit: Path | None) -> tuple[Path, str]:
         return Path(os.environ[ENVIRONMENT]), ENVIRONMENT
     if (default_prior_path() / FILE).is_file():
         return default_prior_path(), "the user's data folder"
-    if (starter_prior_path() / FILE).is_file():
-        return starter_prior_path(), "the starter prior"
-    raise PriorError(
-        "There is no prior yet",
-        expected=f"--prior, {ENVIRONMENT}, {default_prior_path()} or {starter_prior_path()}",
-        fix="build one from your meshes with brrp build-prior MESHES/, or run brrp demo, which "
-        "makes a small one from household shapes",
-    )
+    from brrp_cli.demo.starter import starter_prior
+
+    return starter_prior(), "the starter prior"

@@ -36,7 +36,8 @@ def _from_mesh(name: str, original, parameters: BuildParameters) -> PriorObject:
     # Far from the origin float32 has no digits left for the shape: work around the centre.
     offset = original.bounds.mean(axis=0)
     original.apply_translation(-offset)
-    repaired = repair(original)
+    with np.errstate(divide="ignore", invalid="ignore"):  # trimesh: centres of flat parts
+        repaired = repair(original)
     mesh = repaired.mesh
     poses = [
         dataclasses.replace(pose, T_plane_object=_moved(pose.T_plane_object, -offset))

@@ -77,7 +77,7 @@ class Manifest:
             "shards": [asdict(entry) for entry in self.shards],
             "failed": [asdict(entry) for entry in self.failed],
         }
-        return (json.dumps(table, indent=1, ensure_ascii=False) + "\n").encode()
+        return (json.dumps(table, indent=1, ensure_ascii=False, sort_keys=True) + "\n").encode()
 
     @property
     def libraries(self) -> dict[str, list[str]]:

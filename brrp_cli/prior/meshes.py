@@ -48,6 +48,7 @@ def load_mesh(path: Path, units: str = "m") -> trimesh.Trimesh:
     mesh.remove_unreferenced_vertices()
     mesh.merge_vertices(merge_tex=True, merge_norm=True)
     _check_size(mesh.extents, path, units)
+    _check_thickness(mesh, path)
     return mesh
 
 
@@ -67,4 +68,14 @@ def _check_size(extents: np.ndarray, path: Path, units: str) -> None:
             where=path,
             expected=f"at least {MIN_EXTENT:g} m in one direction",
             found=f"{size}, read with --units {units}",
+        )
+
+
+def _check_thickness(mesh: trimesh.Trimesh, path: Path) -> None:
+    spread = np.linalg.svd(mesh.vertices - mesh.vertices.mean(axis=0), compute_uv=False)
+    if len(spread) < 3 or spread[2] < 1e-6 * spread[0]:
+        raise MeshError(
+            "The mesh is flat: it has no inside",
+            where=path,
+            found=f"{len(mesh.vertices)} vertices in one plane",
         )

@@ -15,7 +15,7 @@ import numpy as np
 
 from brrp_cli.dependencies import import_library
 from brrp_cli.errors import MeshError
-from brrp_cli.prior.bodies import is_solid, unite_bodies
+from brrp_cli.prior.bodies import is_flat, is_solid, unite_bodies
 from brrp_cli.prior.distances import surface_distances
 
 if TYPE_CHECKING:
@@ -70,15 +70,22 @@ def _tidy(mesh: trimesh.Trimesh) -> tuple[trimesh.Trimesh, list[str]]:
     before = len(mesh.faces)
     mesh.update_faces(_faces_that_count(mesh.faces))
     mesh.remove_unreferenced_vertices()
+    if len(mesh.faces) == 0:
+        raise MeshError("The mesh encloses nothing", found=f"{before} faces, all of them needles")
     if len(mesh.faces) < before:
         steps.append(f"dropped {before - len(mesh.faces)} degenerate or duplicate faces")
     if not mesh.is_winding_consistent:
         mesh.fix_normals(multibody=True)
         steps.append("made the winding consistent")
-    before = len(mesh.faces)
-    mesh.fill_holes()
-    if len(mesh.faces) > before:
-        steps.append(f"filled holes of 3 or 4 edges with {len(mesh.faces) - before} faces")
+    filled = mesh.copy()
+    filled.fill_holes()
+    # Filling the rim of a lone triangle would only double it.
+    bodies = filled.split(only_watertight=False)
+    if sum(body.area for body in bodies if is_flat(body)) < filled.area / 2:
+        if len(filled.faces) > len(mesh.faces):
+            added = len(filled.faces) - len(mesh.faces)
+            steps.append(f"filled holes of 3 or 4 edges with {added} faces")
+        mesh = filled
     return mesh, steps
 
 
@@ -111,8 +118,8 @@ def _split_and_fill(mesh: trimesh.Trimesh) -> tuple[trimesh.Trimesh, list[str]]:
     mesh = _meshlab(mesh, ("meshing_repair_non_manifold_vertices", {"vertdispratio": 0.0}))
     rims = boundary_rims(mesh)
     limit = SMALL_HOLE * np.linalg.norm(mesh.extents)
-    small = [len(rim) for rim in rims if np.linalg.norm(np.ptp(rim, axis=0)) <= limit]
-    wide = [len(rim) for rim in rims if np.linalg.norm(np.ptp(rim, axis=0)) > limit]
+    small = [len(rim) for rim in rims if _width(rim) <= limit]
+    wide = [len(rim) for rim in rims if _width(rim) > limit]
     # pymeshlab tells holes apart by their number of edges alone.
     edges = max((n for n in small if n < min(wide, default=n + 1)), default=0)
     if edges:
@@ -120,13 +127,14 @@ def _split_and_fill(mesh: trimesh.Trimesh) -> tuple[trimesh.Trimesh, list[str]]:
         mesh = _meshlab(
             mesh, ("meshing_close_holes", {"maxholesize": edges + 1, "selfintersection": False})
         )
-        steps.append(f"filled small holes with {len(mesh.faces) - before} faces")
+        if len(mesh.faces) > before:
+            steps.append(f"filled small holes with {len(mesh.faces) - before} faces")
     return mesh, steps
 
 
 def _wrap(mesh: trimesh.Trimesh) -> tuple[trimesh.Trimesh, list[str]]:
     pymeshlab = import_library("pymeshlab")
-    widest = max((np.linalg.norm(np.ptp(r, axis=0)) for r in boundary_rims(mesh)), default=0.0)
+    widest = max((_width(rim) for rim in boundary_rims(mesh)), default=0.0)
     diagonal = float(np.linalg.norm(mesh.extents))
     wrapped = _meshlab(
         mesh,
@@ -157,6 +165,10 @@ def boundary_rims(mesh: trimesh.Trimesh) -> list[np.ndarray]:
     rim_vertices = np.unique(edges)
     labels = label[rim_vertices]
     return [mesh.vertices[rim_vertices[labels == k]].copy() for k in np.unique(labels)]
+
+
+def _width(rim: np.ndarray) -> float:
+    return 2 * float(np.linalg.norm(rim - rim.mean(axis=0), axis=1).max())
 
 
 def _meshlab(mesh: trimesh.Trimesh, step: tuple[str, dict[str, Any]]) -> trimesh.Trimesh:

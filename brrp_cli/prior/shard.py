@@ -83,7 +83,7 @@ def write_shard(path: Path, objects: list[StoredObject], parameters: dict[str, A
         for stored in objects:
             group = file.create_group(f"objects/{stored.name}")
             group.attrs["input_sha256"] = stored.input_sha256
-            group.attrs["record"] = json.dumps(stored.record, sort_keys=True)
+            group.attrs["record"] = json.dumps(stored.record)
             group.attrs["content_sha256"] = _content_sha256(stored.arrays, stored.record)
             for key, (dtype, _) in ARRAYS.items():
                 group.create_dataset(

@@ -13,10 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brrp_cli.config import FeatureConfig, RegistrationConfig
-from brrp_cli.dependencies import import_open3d
 from brrp_cli.geometry import similarity
 from brrp_cli.prior.objects import FeatureCloud, PriorObject
 from brrp_cli.registration.fpfh import fpfh_cloud
+from brrp_cli.registration.ransac import match_features
 from brrp_cli.seeds import child_seed
 
 
@@ -65,58 +65,17 @@ def register(
 ) -> Placement | None:
     """Place a stored object at the scale of the scan with most inlier pairs.
 
-    scales : the members of the scan to try, all by default. Returns None when no scale has more
-    inliers than one draw has points: Open3D then returns the identity. The first of equal scales
-    wins.
+    scales : the members of the scan to try, all by default. Returns None when no scale has
+    an inlier. The first of equal scales wins.
     """
     best: Placement | None = None
     for scale in features.scales if scales is None else scales:
         source = stored.clouds[scale]
-        T_center_source, inliers, fitness = _ransac(
-            source, observed.cloud, config, child_seed(seed, "ransac", stored.name, str(scale))
-        )
-        if inliers > (best.inliers if best else config.draw):
+        match_seed = child_seed(seed, "ransac", stored.name, str(scale))
+        found = match_features(source, observed.cloud, config, match_seed)
+        if found is not None and found.inliers > (best.inliers if best else 0):
             T_cam_center = similarity(translation=observed.center)
             T_source_object = similarity(scale=features.base_scale * scale)
-            T_cam_object = T_cam_center @ T_center_source @ T_source_object
-            best = Placement(T_cam_object, scale, inliers, fitness)
+            T_cam_object = T_cam_center @ found.T_target_source @ T_source_object
+            best = Placement(T_cam_object, scale, found.inliers, found.fitness)
     return best
-
-
-def _ransac(
-    source: FeatureCloud, target: FeatureCloud, config: RegistrationConfig, seed: int
-) -> tuple[NDArray[np.float64], int, float]:
-    """Rigid T_target_source, its number of inlier pairs and their share of the source."""
-    o3d = import_open3d()
-    pipeline = o3d.pipelines.registration
-    distance = config.correspondence_distance
-    # Seeded right before the call, or an earlier draw in the process would change the result.
-    o3d.utility.random.seed(seed)
-    result = pipeline.registration_ransac_based_on_feature_matching(
-        _cloud(source),
-        _cloud(target),
-        _feature(source),
-        _feature(target),
-        False,
-        distance,
-        pipeline.TransformationEstimationPointToPoint(False),
-        config.draw,
-        [
-            pipeline.CorrespondenceCheckerBasedOnEdgeLength(config.edge_length),
-            pipeline.CorrespondenceCheckerBasedOnDistance(distance),
-        ],
-        pipeline.RANSACConvergenceCriteria(config.iterations, config.confidence),
-    )
-    inliers = len(result.correspondence_set)
-    return np.asarray(result.transformation).copy(), inliers, float(result.fitness)
-
-
-def _cloud(cloud: FeatureCloud) -> object:
-    o3d = import_open3d()
-    return o3d.geometry.PointCloud(o3d.utility.Vector3dVector(cloud.points))
-
-
-def _feature(cloud: FeatureCloud) -> object:
-    feature = import_open3d().pipelines.registration.Feature()
-    feature.data = cloud.fpfh.T
-    return feature

@@ -1,10 +1,11 @@
 """Retrieval without a model: every stored object is tried on, and how well it fits is its score.
 
-What it does, honestly: it registers each stored object, near its true size, to the observed points
-and scores the share of observed points that the placed model explains less the share of the model
-that stands in space seen to be free. It sees shape and size, no colour; its probabilities are a
-softmax of that score and are not calibrated; and its cost grows with the prior, about a tenth of a
-second for each pair of a stored and a seen object. For a prior of hundreds of objects use CLIP.
+What it does, honestly: it places each stored object, in its true size, on the observed points from
+a few starts, refines each and scores the best by the share of observed points that the placed
+model explains less the share of the model that stands in space seen to be free. It sees shape and
+size, no colour; its probabilities are a softmax of that score and are not calibrated; and its cost
+grows with the prior, about a tenth of a second for each pair of a stored and a seen object. For a
+prior of hundreds of objects use CLIP.
 """
 
 from __future__ import annotations
@@ -17,17 +18,22 @@ from numpy.typing import NDArray
 
 from brrp_cli.config import Config
 from brrp_cli.frames.frame import Frame
-from brrp_cli.geometry import transform_points
-from brrp_cli.prior.objects import PriorObject
+from brrp_cli.geometry import normalise, similarity, transform_points
+from brrp_cli.prior.objects import FeatureCloud, PriorObject
 from brrp_cli.prior.store import Prior
 from brrp_cli.registration.evidence import contradicted, explained
-from brrp_cli.registration.scan import ObservedCloud, observed_cloud, register
+from brrp_cli.registration.ransac import match_features
+from brrp_cli.registration.refine import refine
+from brrp_cli.registration.scan import ObservedCloud, observed_cloud
 from brrp_cli.retrieval.base import softmax
+from brrp_cli.seeds import child_seed
 
-# Far fewer draws than the placement that follows: the score ranks, it does not place.
-ITERATIONS = 20_000
-# How far a placed model may lie from the depth image before it counts against it, metres.
-TOLERANCE = 0.0075
+# Feature matchings for each stored object, and draws in each: the score ranks, it does not place.
+STARTS = 3
+ITERATIONS = 10_000
+# How far apart observed points and model may lie to be pulled together, and to agree, metres.
+REFINE_DISTANCE = 0.02
+TOLERANCE = 0.005
 # Score difference that makes one object e times as probable as another.
 TEMPERATURE = 0.05
 # Model points that are compared with the image.
@@ -40,14 +46,20 @@ log = logging.getLogger(__name__)
 
 @dataclass(frozen=True)
 class _Candidate:
-    """A stored object with the one scale that is nearest to its true size."""
+    """A stored object, metres, about the middle of its box.
 
-    stored: PriorObject
-    scale: float
+    cloud : features at the scale of the scan nearest to the true size; surface, normals : (n, 3),
+    in the true size.
+    """
+
+    name: str
+    cloud: FeatureCloud
+    surface: NDArray[np.float64]
+    normals: NDArray[np.float64]
 
 
 class FitnessRetriever:
-    """P(c|R) from registration fitness over all objects of a small prior."""
+    """P(c|R) from how well each object of a small prior can be made to fit."""
 
     name = "fitness"
 
@@ -59,6 +71,7 @@ class FitnessRetriever:
                 len(prior.names),
             )
         self._config = config
+        self._matching = replace(config.registration, iterations=ITERATIONS)
         self._seed = seed
         self._candidates = [_candidate(prior.load(name), config) for name in prior.names]
 
@@ -69,28 +82,42 @@ class FitnessRetriever:
         return softmax(np.array(scores) / TEMPERATURE)
 
     def _score(self, candidate: _Candidate, observed: ObservedCloud, frame: Frame) -> float:
-        """Explained less contradicted, in [-1, 1]; -1 when nothing matches at all."""
-        placement = register(
-            observed,
-            candidate.stored,
-            self._config.features,
-            replace(self._config.registration, iterations=ITERATIONS),
-            self._seed,
-            scales=[candidate.scale],
-        )
-        if placement is None:
-            return -1.0
-        model = transform_points(placement.T_cam_object, candidate.stored.surface)
-        seen = observed.cloud.points + observed.center
-        against = contradicted(model[:MODEL_POINTS], frame, TOLERANCE)
-        return explained(seen, model, TOLERANCE) - against
+        """Explained less contradicted, in [-1, 1], of the best start."""
+        best = -1.0
+        for start in self._starts(candidate, observed):
+            T_center_model = refine(
+                start, observed.cloud.points, candidate.surface, candidate.normals, REFINE_DISTANCE
+            )
+            model = transform_points(T_center_model, candidate.surface) + observed.center
+            seen = observed.cloud.points + observed.center
+            against = contradicted(model[:MODEL_POINTS], frame, TOLERANCE)
+            best = max(best, explained(seen, model, TOLERANCE) - against)
+        return best
+
+    def _starts(self, candidate: _Candidate, observed: ObservedCloud) -> list[NDArray[np.float64]]:
+        """T_center_model of each start: matched features, and the model just behind its front.
+
+        What has no features to match, a ball, needs no turning either.
+        """
+        behind = normalise(observed.center) * np.ptp(candidate.surface, axis=0).mean() / 4
+        starts = [similarity(translation=behind)]
+        for number in range(STARTS):
+            seed = child_seed(self._seed, "fitness", candidate.name, number)
+            found = match_features(candidate.cloud, observed.cloud, self._matching, seed)
+            if found is not None:
+                starts.append(found.T_target_source)
+        return starts
 
 
 def _candidate(stored: PriorObject, config: Config) -> _Candidate:
-    """The scale of the scan nearest to the object's true size; other clouds are let go."""
     features = config.features
-    scale = min(
+    nearest = min(
         features.scales,
-        key=lambda s: abs(np.log(s * features.base_scale / stored.half_extent)),
+        key=lambda scale: abs(np.log(scale * features.base_scale / stored.half_extent)),
     )
-    return _Candidate(replace(stored, clouds={scale: stored.clouds[scale]}), scale)
+    return _Candidate(
+        stored.name,
+        stored.clouds[nearest],
+        stored.surface.astype(np.float64) * stored.half_extent,
+        stored.surface_normals.astype(np.float64),
+    )

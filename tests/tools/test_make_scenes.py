@@ -164,6 +164,15 @@ def test_check_fails_on_an_id_that_is_no_objects(data, made, tmp_path):
     assert "99" in failed.output
 
 
+def test_a_check_that_sees_no_object_is_no_success(data, made, tmp_path):
+    scenes = copy_of(made, tmp_path / "scenes")
+    for path in scenes.glob("*/*/seg_mask.npy"):
+        np.save(path, np.zeros((120, 160), np.int32))
+    failed = CliRunner().invoke(main, ["--check", "--data-root", str(data), "-o", str(scenes)])
+    assert failed.exit_code == 1
+    assert "Nothing could be checked" in failed.output
+
+
 def test_noise_changes_depth_alone(data, made):
     result = generate(data, data / "noisy", "--scenes", 1, "--noise", "structured-light")
     assert result.exit_code == 0, result.output

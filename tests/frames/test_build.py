@@ -1,0 +1,182 @@
+"""Every way in which a frame can be wrong, and the message it gets."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from brrp_cli.errors import FrameError
+from brrp_cli.frames.build import make_frame, require_objects
+
+K = np.array([[60.0, 0, 4], [0, 60.0, 3], [0, 0, 1]])
+SHAPE = (6, 8)
+
+
+def good(**changes):
+    """Arguments of a good frame, with changes."""
+    mask = np.zeros(SHAPE, int)
+    mask[2:4, 2:4] = 7
+    arguments = {
+        "rgb": np.zeros((*SHAPE, 3), np.uint8),
+        "segmap": mask,
+        "depth": np.full(SHAPE, 0.8, np.float32),
+        "K": K,
+    }
+    return {**arguments, **changes}
+
+
+def matrix(**entries):
+    """K with entries changed, such as a00=-1."""
+    changed = K.copy()
+    for name, value in entries.items():
+        changed[int(name[1]), int(name[2])] = value
+    return changed
+
+
+ROWS, COLUMNS = np.mgrid[:6, :8]
+POINTS = np.stack([(COLUMNS - 4) / 75, (ROWS - 3) / 75, np.full(SHAPE, 0.8)], axis=-1)
+SHUFFLED = np.random.default_rng(0).permutation(POINTS.reshape(-1, 3)).reshape(6, 8, 3)
+ONE_PIXEL = np.where((ROWS == 2)[..., None] & (COLUMNS == 2)[..., None], POINTS, np.nan)
+SHEAR = np.diag([1.0, 2, 1, 1])
+
+ZOO = {
+    "depth all zero": ({"depth": np.zeros(SHAPE)}, "no valid pixel"),
+    "depth all NaN": ({"depth": np.full(SHAPE, np.nan)}, "NaN or inf everywhere"),
+    "depth all inf": ({"depth": np.full(SHAPE, np.inf)}, "NaN or inf everywhere"),
+    "depth negative": ({"depth": np.full(SHAPE, -0.8)}, "negative depth"),
+    "one negative": ({"depth": np.where(np.eye(6, 8), -1, 0.8)}, "negative depth"),
+    "float millimetres": ({"depth": np.full(SHAPE, 800.0)}, "--depth-scale"),
+    "scale too large": ({"depth_scale": 100.0}, "not in metres"),
+    "scale too small": ({"depth_scale": 1e-3}, "not in metres"),
+    "scale negative": ({"depth_scale": -1.0}, "no positive number"),
+    "TUM units as mm": ({"depth": np.full(SHAPE, 25_000, np.uint16)}, "not in metres"),
+    "depth of one row": ({"depth": np.ones(8)}, "depth has the wrong shape"),
+    "depth empty": ({"depth": np.ones((0, 8))}, "depth is empty"),
+    "depth complex": ({"depth": np.ones(SHAPE, complex)}, "real numbers"),
+    "depth strings": ({"depth": np.full(SHAPE, "far")}, "real numbers"),
+    "K missing": ({"K": None}, "without intrinsics"),
+    "K flat": ({"K": K.ravel()}, "K has the wrong shape"),
+    "K transposed": ({"K": K.T}, "transposed"),
+    "K singular": ({"K": matrix(a11=0)}, "not positive"),
+    "K negative": ({"K": matrix(a00=-60)}, "not positive"),
+    "K NaN": ({"K": matrix(a02=np.nan)}, "finite"),
+    "K skewed": ({"K": matrix(a01=5)}, "without skew"),
+    "K last row": ({"K": matrix(a22=2)}, "without skew"),
+    "K normalised": ({"K": matrix(a00=0.2, a11=0.2, a02=0.5, a12=0.5)}, "not in pixels"),
+    "no geometry": ({"depth": None}, "Neither depth nor points"),
+    "xyz shape": ({"depth": None, "xyz": np.ones((48, 3))}, "xyz has the wrong shape"),
+    "xyz millimetres": ({"depth": None, "K": None, "xyz": POINTS * 1000}, "--depth-scale"),
+    "xyz behind": ({"depth": None, "K": None, "xyz": -POINTS}, "negative depth"),
+    "xyz y up": ({"depth": None, "K": None, "xyz": POINTS * [1, -1, 1]}, "no pinhole"),
+    "xyz in world": ({"depth": None, "K": None, "xyz": POINTS[..., ::-1] + 1}, "no pinhole"),
+    "xyz shuffled": ({"depth": None, "K": None, "xyz": SHUFFLED}, "no pinhole"),
+    "xyz against K": (
+        {"depth": None, "K": matrix(a00=90), "xyz": POINTS * [9, 1, 1]},
+        "no pinhole",
+    ),
+    "xyz one pixel": ({"depth": None, "K": None, "xyz": ONE_PIXEL}, "no pinhole"),
+    "mask size": ({"segmap": np.ones((6, 9), int)}, "wrong shape"),
+    "mask colour": ({"segmap": np.ones((6, 8, 3), int)}, "no map of object ids"),
+    "mask fractions": ({"segmap": np.full(SHAPE, 0.5)}, "no map of object ids"),
+    "mask NaN": ({"segmap": np.full(SHAPE, np.nan)}, "no map of object ids"),
+    "mask too big": ({"segmap": np.full(SHAPE, 2**63, np.uint64)}, "no map of object ids"),
+    "rgb float": ({"rgb": np.zeros((*SHAPE, 3))}, "rgb has the wrong type"),
+    "rgb grey": ({"rgb": np.zeros(SHAPE, np.uint8)}, "rgb has the wrong shape"),
+    "rgb size": ({"rgb": np.zeros((12, 16, 3), np.uint8)}, "rgb has the wrong shape"),
+    "pose shape": ({"T_world_cam": np.eye(3)}, "no rigid transform"),
+    "pose shear": ({"T_world_cam": SHEAR}, "no rigid transform"),
+    "pose mirror": ({"T_world_cam": np.diag([1.0, 1, -1, 1])}, "no rigid transform"),
+    "pose NaN": ({"T_world_cam": np.full((4, 4), np.nan)}, "no rigid transform"),
+}
+
+
+@pytest.mark.parametrize("name", ZOO)
+def test_a_wrong_frame_gets_one_clear_message(name):
+    changes, message = ZOO[name]
+    with pytest.raises(FrameError, match=message):
+        make_frame(**good(**changes))
+
+
+def test_a_mask_without_objects_is_told_how_to_be_mended():
+    frame = make_frame(**good(segmap=np.zeros(SHAPE, int)))
+    with pytest.raises(FrameError, match=r"no object in the mask(.|\n)*--segment"):
+        require_objects(frame)
+
+
+@pytest.mark.parametrize("dtype", [np.uint8, np.int16, np.uint16, np.int64, np.float32])
+def test_masks_of_any_dtype_keep_their_ids(dtype):
+    mask = good()["segmap"].astype(dtype)
+    mask[0, 0] = 250
+    assert make_frame(**good(segmap=mask)).object_ids == [7, 250]
+
+
+def test_negative_ids_are_objects():
+    mask = np.where(good()["segmap"] == 7, -4, 0)
+    assert make_frame(**good(segmap=mask)).object_ids == [-4]
+
+
+@pytest.mark.parametrize(
+    ("raw", "scale", "metres"),
+    [
+        (np.uint16(800), None, 0.8),
+        (np.int32(1500), None, 1.5),
+        (np.float64(0.8), None, 0.8),
+        (np.uint16(5000), 0.0002, 1.0),
+        (np.float32(800), 0.001, 0.8),
+    ],
+)
+def test_depth_becomes_metres(raw, scale, metres):
+    frame = make_frame(**good(depth=np.full(SHAPE, raw), depth_scale=scale))
+    assert frame.points[..., 2] == pytest.approx(metres, rel=1e-6)
+
+
+def test_pixels_without_return_are_not_valid():
+    depth = good()["depth"].copy()
+    depth[0, 0], depth[0, 1], depth[0, 2] = 0, np.nan, np.inf
+    valid = make_frame(**good(depth=depth)).valid
+    assert not valid[0, :3].any()
+    assert valid.sum() == 45
+
+
+def test_an_object_on_invalid_depth_alone_is_kept_without_points():
+    depth = np.where(good()["segmap"] == 7, np.nan, 0.8)
+    frame = make_frame(**good(depth=depth))
+    assert frame.object_ids == [7]
+    assert frame.object_points(7).shape == (0, 3)
+
+
+def test_points_follow_the_pinhole_camera():
+    frame = make_frame(**good())
+    assert frame.points == pytest.approx(POINTS.astype(np.float32), abs=1e-6)
+
+
+def test_intrinsics_are_recovered_from_points():
+    points = POINTS.copy()
+    points[1, 1] = np.nan
+    points[2, 2] = 0
+    frame = make_frame(**good(depth=None, K=None, xyz=points))
+    assert pytest.approx(K, abs=1e-4) == frame.K
+    assert not frame.valid[1, 1]
+    assert not frame.valid[2, 2]
+
+
+def test_a_principal_point_outside_the_image_is_noted(caplog):
+    make_frame(**good(K=matrix(a02=20)))
+    assert "outside the 8 x 6 image" in caplog.text
+
+
+def test_missing_colour_becomes_grey():
+    assert (make_frame(**good(rgb=None)).rgb == 128).all()
+
+
+def test_the_callers_arrays_stay_as_they_were():
+    arguments = good(T_world_cam=np.eye(4))
+    before = {name: value.copy() for name, value in arguments.items()}
+    frame = make_frame(**arguments)
+    for name, value in before.items():
+        assert np.array_equal(arguments[name], value), name
+        assert arguments[name].flags.writeable, name
+    arguments["segmap"][:] = 9
+    assert frame.object_ids == [7]
+    with pytest.raises(ValueError, match="read-only"):
+        frame.points[0, 0] = 0

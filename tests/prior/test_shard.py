@@ -1,0 +1,143 @@
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+
+from brrp_cli.errors import PriorError
+from brrp_cli.prior.objects import FeatureCloud, PriorObject, RestingPose
+from brrp_cli.prior.pack import pack, unpack
+from brrp_cli.prior.shard import ARRAYS, object_names, open_shard, read_stored, write_shard
+
+
+def example(name: str = "cup", seed: int = 0) -> PriorObject:
+    rng = np.random.default_rng(seed)
+
+    def cloud(n: int) -> FeatureCloud:
+        normals = rng.normal(size=(n, 3))
+        normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+        return FeatureCloud(rng.normal(size=(n, 3)), normals, rng.uniform(0, 200, (n, 33)))
+
+    return PriorObject(
+        name=name,
+        description="a cup",
+        center=np.array([0.25, -0.5, 1.0]),
+        half_extent=0.0625,
+        samples=rng.normal(size=(50, 3)).astype(np.float32),
+        labels=rng.random(50) < 0.5,
+        surface=rng.normal(size=(20, 3)).astype(np.float32),
+        surface_normals=rng.normal(size=(20, 3)).astype(np.float32),
+        clouds={0.5: cloud(7), 1.22: cloud(13)},
+        poses=[RestingPose(np.eye(4), 0.75), RestingPose(np.diag([1.0, -1, -1, 1]), 0.25)],
+        record={"extents": [0.125, 0.0625, 0.03125], "repair": {"steps": []}},
+    )
+
+
+@pytest.fixture
+def shard(tmp_path: Path) -> Path:
+    path = tmp_path / "shard.h5"
+    objects = [pack(example("cup"), "aa"), pack(example("jar", 1), "bb")]
+    write_shard(path, objects, {"seed": 0})
+    return path
+
+
+def test_what_is_written_is_read(shard: Path) -> None:
+    with open_shard(shard) as file:
+        assert object_names(file) == ["cup", "jar"]
+        stored = read_stored(file, "jar")
+    assert stored.input_sha256 == "bb"
+    want, got = example("jar", 1), unpack(stored, "a cup")
+    for key in ("name", "description", "half_extent", "record"):
+        assert getattr(got, key) == getattr(want, key)
+    for key in ("center", "samples", "labels", "surface", "surface_normals"):
+        np.testing.assert_array_equal(getattr(got, key), getattr(want, key))
+        assert getattr(got, key).dtype == getattr(want, key).dtype
+    assert list(got.clouds) == [0.5, 1.22]
+    for scale, cloud in got.clouds.items():
+        np.testing.assert_allclose(cloud.points, want.clouds[scale].points, rtol=1e-6)
+        np.testing.assert_allclose(cloud.normals, want.clouds[scale].normals, atol=1e-3)
+        np.testing.assert_allclose(cloud.fpfh, want.clouds[scale].fpfh, rtol=1e-3)
+        assert cloud.fpfh.dtype == np.float64
+    assert [pose.probability for pose in got.poses] == [0.75, 0.25]
+
+
+def test_taking_an_object_over_gives_the_same_bytes(shard: Path, tmp_path: Path) -> None:
+    with open_shard(shard) as file:
+        objects = [read_stored(file, name) for name in object_names(file)]
+    write_shard(tmp_path / "again.h5", objects, {"seed": 0})
+    assert (tmp_path / "again.h5").read_bytes() == shard.read_bytes()
+
+
+def test_every_data_set_has_checksums(shard: Path) -> None:
+    with h5py.File(shard) as file:
+        for key in ARRAYS:
+            assert file["objects/cup"][key].fletcher32
+
+
+def replace(shard: Path, key: str, data: np.ndarray, **options: object) -> None:
+    with h5py.File(shard, "r+") as file:
+        group = file["objects/cup"]
+        del group[key]
+        group.create_dataset(key, data=data, **{"chunks": True, "fletcher32": True, **options})
+
+
+def reading(shard: Path) -> str:
+    with pytest.raises(PriorError) as caught, open_shard(shard) as file:
+        read_stored(file, "cup")
+    return str(caught.value)
+
+
+def test_wrong_arrays_are_named(shard: Path) -> None:
+    pristine = shard.read_bytes()
+    samples = example().samples
+    cases = {
+        "<f4": samples.astype(np.float64),
+        "expected 50": np.zeros(49, np.uint8),
+        "NaN": np.full((50, 3), np.nan, np.float32),
+        "checksum": samples + 1,
+        "samples: <f4 (50,)": samples[:, 0],
+    }
+    for told, data in cases.items():
+        shard.write_bytes(pristine)
+        replace(shard, "labels" if told == "expected 50" else "samples", data)
+        assert told in reading(shard)
+    shard.write_bytes(pristine)
+    replace(shard, "samples", samples, fletcher32=False)
+    assert "with checksums" in reading(shard)
+
+
+def test_a_huge_declared_shape_is_refused_unread(shard: Path) -> None:
+    with h5py.File(shard, "r+") as file:
+        del file["objects/cup/samples"]
+        options = {"chunks": (1000, 3), "fletcher32": True}
+        file["objects/cup"].create_dataset("samples", (10**12, 3), "f4", **options)
+    assert "1000000000000" in reading(shard)
+
+
+def test_links_out_of_the_file_are_not_followed(shard: Path, tmp_path: Path) -> None:
+    other = tmp_path / "other.h5"
+    other.write_bytes(shard.read_bytes())
+    for link in (h5py.ExternalLink(str(other), "/objects/cup/samples"), h5py.SoftLink("/a")):
+        with h5py.File(shard, "r+") as file:
+            if "samples" in file["objects/cup"].keys():  # noqa: SIM118, a dangling link too
+                del file["objects/cup/samples"]
+            file["objects/cup/samples"] = link
+        assert "no data set samples" in reading(shard)
+    with h5py.File(shard, "r+") as file:
+        del file["objects"]
+        file["objects"] = h5py.ExternalLink(str(other), "/objects")
+    with pytest.raises(PriorError, match="no group"), open_shard(shard) as file:
+        object_names(file)
+
+
+def test_what_is_no_shard_or_newer_is_told(shard: Path, tmp_path: Path) -> None:
+    with h5py.File(shard, "r+") as file:
+        file.attrs["schema"] = 99
+    with pytest.raises(PriorError, match="newer brrp"), open_shard(shard):
+        pass
+    with h5py.File(tmp_path / "x.h5", "w") as file:
+        file["a"] = 1
+    with pytest.raises(PriorError, match="no shard"), open_shard(tmp_path / "x.h5"):
+        pass
+    with pytest.raises(PriorError, match="missing"), open_shard(tmp_path / "absent.h5"):
+        pass
