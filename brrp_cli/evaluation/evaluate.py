@@ -15,7 +15,7 @@ from brrp_cli.evaluation.bootstrap import ROUNDS
 from brrp_cli.evaluation.folder import PARAMETERS, ROWS, claimed
 from brrp_cli.evaluation.report import write_report
 from brrp_cli.evaluation.rows import METRICS, Row, RowLog, table
-from brrp_cli.evaluation.run import Plan, close_true_meshes, collect, run_missing
+from brrp_cli.evaluation.run import Plan, collect, remaining, run_remaining
 from brrp_cli.evaluation.scenes import Scene, find_scenes
 from brrp_cli.evaluation.summary import (
     VariantSummary,
@@ -102,16 +102,15 @@ def evaluate(request: Request, say: Callable[[str], None] = lambda text: None) -
     )
     with claimed(request.output, parameters, overwrite=request.overwrite) as path:
         say(f"{len(scenes)} scenes, {workers} workers: {', '.join(labels.values())}")
-        meshes = len({o.mesh_path for scene in scenes for o in scene.objects})
-        for closed, error in progress(close_true_meshes(plan, workers), "true meshes", meshes):
-            if error is not None:
-                say(f"{closed.mesh_path}: {error}")
         log = RowLog(path)
         lost: dict[str, str] = {}
-        for scene, error in progress(run_missing(plan, log, workers), "scenes", len(scenes)):
+        todo = remaining(plan, log)
+        work = run_remaining(plan, log, todo, workers)
+        for ended, error in progress(work, "true meshes, then scenes", len(todo)):
+            if error is not None and isinstance(ended, Scene):
+                lost[ended.name] = str(error)
             if error is not None:
-                lost[scene.name] = str(error)
-                say(f"Scene {scene.name}: {error}")
+                say(f"{ended.name}: {error}")
         rows = collect(plan, log, lost)
         about = {
             **parameters,

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -40,7 +39,6 @@ _prior = cache(open_prior)
 
 def evaluate_scene(plan: Plan, scene: Scene, variants: list[Variant], log: Path) -> None:
     """Append the rows of every variant, each variant's as soon as they are known."""
-    logging.getLogger().setLevel(logging.ERROR)
     rows = RowLog(log)
     try:
         clean = scene.view(plan.view)

@@ -52,9 +52,9 @@ How to read it:
   thickened; IoU at 5 mm and F-score at 1 cm on a 5 mm grid, against that mesh too.
 - Probabilities are judged on a 1 cm grid in the true bounding box grown by 5 cm; occluded points
   lie behind the depth that was measured along their ray, those inside and below the table
-  included. ECE: 15 bins, over the points of all objects. AUSE (0: perfect) ranks points by the method's own
-  uncertainty, or by the entropy of the probability; the error is the squared difference of
-  probability and truth.
+  included. ECE: 15 bins, over the points of all objects. AUSE (0: perfect) ranks points by the
+  method's own uncertainty, or by the entropy of the probability; the error is the squared
+  difference of probability and truth.
 - Seconds are wall time on one thread for each object's share; memory is the process's peak.
 """
 

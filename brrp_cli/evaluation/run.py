@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 from brrp_cli.errors import BrrpError
 from brrp_cli.evaluation.rows import OBJECT, Row, RowLog, finished, variant_columns, variant_of
 from brrp_cli.evaluation.scenes import Scene
-from brrp_cli.evaluation.true_meshes import prepare
 from brrp_cli.evaluation.truth import TrueObject
 from brrp_cli.evaluation.variants import Variant, same_results
 from brrp_cli.prior.workers import run_tasks
@@ -36,47 +37,68 @@ class Plan:
     pictures: Path | None = None
 
 
-def close_true_meshes(plan: Plan, workers: int) -> Iterator[tuple[TrueObject, BrrpError | None]]:
-    """Close each true mesh of the scenes once; yields one of its objects as each is done.
+@dataclass(frozen=True)
+class Remaining:
+    """What is still to do: true meshes to close (one object of each file), scenes to evaluate."""
 
-    Errors: the first failure, if not one mesh could be closed.
+    meshes: list[TrueObject]
+    scenes: list[tuple[Scene, list[Variant]]]
+
+    def __len__(self) -> int:
+        return len(self.meshes) + len(self.scenes)
+
+
+def remaining(plan: Plan, log: RowLog) -> Remaining:
+    """What the log does not hold yet; views that a killed run left half done are dropped from it.
+
+    A variant whose configuration equals that of an earlier one is not run.
     """
-    meshes = {o.mesh_path: o for scene in plan.scenes for o in scene.objects}
-    objects = [meshes[path] for path in sorted(meshes)]
-    tasks = [(each, plan.data_root, plan.cache) for each in objects]
-    failures = []
-    for index, result in run_tasks(prepare, tasks, min(workers, len(tasks)), TIME_LIMIT):
-        error = result if isinstance(result, BrrpError) else None
-        if error is not None:
-            failures.append(error)
-            if len(failures) == len(objects):
-                raise failures[0]
-        yield objects[index], error
-
-
-def run_missing(plan: Plan, log: RowLog, workers: int) -> Iterator[tuple[Scene, BrrpError | None]]:
-    """Evaluate what the log does not hold yet; yields each scene as it ends, with the error of one
-    whose worker died.
-
-    A variant whose configuration equals that of an earlier one is not run again.
-    """
-    from brrp_cli.evaluation.evaluate_scene import evaluate_scene
-
     kept, complete = finished(log.read())
     log.replace(kept)
     to_run = dict.fromkeys(same_results(plan.variants).values())
-    todo = []
+    scenes = []
     for scene in plan.scenes:
         missing = [variant for variant in to_run if (scene.name, variant) not in complete]
         if missing:
-            todo.append((scene, missing))
-        else:
-            yield scene, None
+            scenes.append((scene, missing))
+    meshes = {o.mesh_path: o for scene, _ in scenes for o in scene.objects}
+    return Remaining(list(meshes.values()), scenes)
+
+
+def run_remaining(
+    plan: Plan, log: RowLog, todo: Remaining, workers: int
+) -> Iterator[tuple[TrueObject | Scene, BrrpError | None]]:
+    """Do it: meshes first. Yields what has ended, with its error: a mesh that cannot be closed, a
+    scene whose worker died. Errors: the first mesh's, if not one of them can be closed.
+    """
     # A task carries its own scene alone.
     shared = replace(plan, scenes=[])
-    tasks = [(shared, scene, missing, log.path) for scene, missing in todo]
-    for index, result in run_tasks(evaluate_scene, tasks, min(workers, len(tasks)), TIME_LIMIT):
-        yield todo[index][0], result if isinstance(result, BrrpError) else None
+    tasks: list[tuple[Any, ...]] = [(shared, each) for each in todo.meshes]
+    tasks += [(shared, scene, variants, log.path) for scene, variants in todo.scenes]
+    unusable = []
+    for index, result in run_tasks(_work, tasks, min(workers, len(tasks)), TIME_LIMIT):
+        error = result if isinstance(result, BrrpError) else None
+        if index >= len(todo.meshes):
+            yield todo.scenes[index - len(todo.meshes)][0], error
+            continue
+        if error is not None:
+            unusable.append(error)
+            if len(unusable) == len(todo.meshes):
+                raise unusable[0]
+        yield todo.meshes[index], error
+
+
+def _work(plan: Plan, what: TrueObject | Scene, *rest: Any) -> None:
+    """One task of a worker: a true mesh, or a scene with its variants and the log."""
+    from brrp_cli.evaluation.evaluate_scene import evaluate_scene
+    from brrp_cli.evaluation.true_meshes import close_truth
+
+    # What goes wrong is in the rows; what is worth a note to one who reconstructs is not here.
+    logging.getLogger().setLevel(logging.ERROR)
+    if isinstance(what, Scene):
+        evaluate_scene(plan, what, *rest)
+    else:
+        close_truth(what, plan.data_root, plan.cache)
 
 
 def collect(plan: Plan, log: RowLog, lost: Mapping[str, str]) -> list[Row]:

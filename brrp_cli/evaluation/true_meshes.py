@@ -5,7 +5,6 @@ Closing takes seconds a mesh, so that it is done once and kept on disk by the co
 
 from __future__ import annotations
 
-import logging
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -67,13 +66,6 @@ def close_truth(true_object: TrueObject, data_root: Path | None, cache: Path) ->
         for_chamfer=published_truth(mesh, CHAMFER_RESOLUTION, cache),
     )
     return closed.moved(true_object.T_world_object)
-
-
-def prepare(true_object: TrueObject, data_root: Path | None, cache: Path) -> None:
-    """Fill the cache for one mesh file."""
-    # A mesh may be in units of its own before its pose scales it: nobody needs to hear of it.
-    logging.getLogger().setLevel(logging.ERROR)
-    close_truth(true_object, data_root, cache)
 
 
 def _repaired(mesh: trimesh.Trimesh, cache: Path) -> trimesh.Trimesh:
