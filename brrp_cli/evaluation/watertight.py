@@ -38,7 +38,7 @@ def published_truth(
     """
     import trimesh
 
-    kept = None if cache is None else cache / f"{_content_hash(mesh)}-{resolution}.npz"
+    kept = None if cache is None else cache / f"{content_hash(mesh)}-{resolution}.npz"
     if kept is not None and kept.exists():
         with np.load(kept, allow_pickle=False) as arrays:
             return trimesh.Trimesh(arrays["vertices"], arrays["faces"], process=False)
@@ -58,7 +58,8 @@ def published_truth(
     return trimesh.Trimesh(vertices, faces, process=False)
 
 
-def _content_hash(mesh: trimesh.Trimesh) -> str:
+def content_hash(mesh: trimesh.Trimesh) -> str:
+    """What names a mesh by its vertices and faces."""
     digest = hashlib.sha256(np.array(mesh.vertices, dtype="<f8").tobytes())
     digest.update(np.array(mesh.faces, dtype="<i8").tobytes())
     return digest.hexdigest()[:32]

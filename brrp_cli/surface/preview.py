@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from brrp_cli.frames.frame import Frame
 from brrp_cli.frames.picture import draw_masks, object_colours
+from brrp_cli.methods.base import ObjectReconstruction
 from brrp_cli.surface.colours import (
     logit_spread,
     scale_top,
@@ -15,31 +18,40 @@ from brrp_cli.surface.colours import (
 )
 from brrp_cli.surface.render import View, fitted, render, view_from_behind
 
-if TYPE_CHECKING:
-    from brrp_cli.api import Reconstruction
-
 Picture = NDArray[np.uint8]
 
 PANEL_WIDTH = 480
 CAPTION = 28
 INK = (30, 30, 30)
+IMAGE_UP = np.array([0.0, -1.0, 0.0])
 
 
-def preview(result: Reconstruction) -> Picture:
-    """Six panels (H, W, 3): masks, shapes from the camera and from behind; list, uncertainty."""
-    view = _panel_view(result)
-    found = result.reconstructed
+def preview(
+    frame: Frame,
+    objects: Sequence[ObjectReconstruction],
+    *,
+    up: NDArray[np.floating] | None = None,
+    caption: str = "objects",
+) -> Picture:
+    """Six panels (H, W, 3): masks, shapes from the camera and from behind; list, uncertainty.
+
+    up : (3,) the table's normal, camera frame; without one, up in the image
+    caption : stands over the list of objects
+    """
+    view = _panel_view(frame)
+    found = [o for o in objects if o.surface is not None]
     surfaces = [o.surface for o in found if o.surface is not None]
-    behind = fitted(view_from_behind(view, _middle(result), _up(result)), surfaces)
+    up = IMAGE_UP if up is None else up
+    behind = fitted(view_from_behind(view, _middle(objects), up), surfaces)
     top = scale_top([s.uncertainty for s in surfaces])
     unsure = [uncertainty_colours(s.uncertainty, top) for s in surfaces]
-    colours = object_colours(result.frame.object_ids)
+    colours = object_colours(frame.object_ids)
     shapes = [
         np.tile(colours[o.object_id], (len(o.surface.vertices), 1))
         for o in found
         if o.surface is not None
     ]
-    masks = draw_masks(result.frame.rgb, result.frame.segmap)
+    masks = draw_masks(frame.rgb, frame.segmap)
     rows = [
         [
             _captioned(_resized(masks, view.shape), "input and masks"),
@@ -47,7 +59,7 @@ def preview(result: Reconstruction) -> Picture:
             _captioned(render(surfaces, shapes, behind), "from behind"),
         ],
         [
-            _captioned(_listing(result, view.shape), f"retrieved by {result.retriever}"),
+            _captioned(_listing(objects, view.shape), caption),
             _captioned(
                 _with_scale(render(surfaces, unsure, view), top),
                 "uncertainty: spread of the logits, from the camera",
@@ -58,21 +70,16 @@ def preview(result: Reconstruction) -> Picture:
     return np.vstack([np.hstack(row) for row in rows])
 
 
-def _panel_view(result: Reconstruction) -> View:
-    height, width = result.frame.shape
+def _panel_view(frame: Frame) -> View:
+    height, width = frame.shape
     factor = PANEL_WIDTH / width
-    K = result.frame.K * np.array([[factor], [factor], [1.0]])
+    K = frame.K * np.array([[factor], [factor], [1.0]])
     return View(K, np.eye(4), (round(height * factor), PANEL_WIDTH))
 
 
-def _middle(result: Reconstruction) -> NDArray[np.float64]:
-    centers = [o.center for o in result.objects if o.center is not None]
+def _middle(objects: Sequence[ObjectReconstruction]) -> NDArray[np.float64]:
+    centers = [o.center for o in objects if o.center is not None]
     return np.mean(centers, axis=0) if centers else np.array([0.0, 0.0, 1.0])
-
-
-def _up(result: Reconstruction) -> NDArray[np.float64]:
-    """The table's normal; without a table, up in the image."""
-    return np.array([0.0, -1.0, 0.0]) if result.plane is None else result.plane.normal
 
 
 def _resized(picture: Picture, shape: tuple[int, int]) -> Picture:
@@ -96,17 +103,17 @@ def _captioned(picture: Picture, text: str) -> Picture:
     return np.vstack([np.asarray(bar), picture])
 
 
-def _listing(result: Reconstruction, shape: tuple[int, int]) -> Picture:
+def _listing(objects: Sequence[ObjectReconstruction], shape: tuple[int, int]) -> Picture:
     """One line for each object: id, status, and what was retrieved."""
     from PIL import Image, ImageDraw
 
     height, width = shape
     panel = Image.new("RGB", (width, height), "white")
     draw = ImageDraw.Draw(panel)
-    line = min(44, (height - 8) // max(len(result.objects), 1))
+    line = min(44, (height - 8) // max(len(objects), 1))
     size = max(8, min(13, line // 2 - 3))
-    colours = object_colours(result.frame.object_ids)
-    for row, item in enumerate(result.objects):
+    colours = object_colours([item.object_id for item in objects])
+    for row, item in enumerate(objects):
         y = 6 + row * line
         colour = tuple(int(c) for c in colours[item.object_id])
         draw.rectangle((8, y, 20, y + 12), fill=colour)

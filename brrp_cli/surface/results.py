@@ -56,7 +56,10 @@ def write_results(
         save_posteriors(posteriors, partial / "posterior.h5")
         record = json.dumps(result_record(result, frame), indent=2) + "\n"
         (partial / RECORD).write_text(record)
-        Image.fromarray(preview(result)).save(partial / "preview.png")
+        caption = f"retrieved by {result.retriever}"
+        up = None if result.plane is None else result.plane.normal
+        picture = preview(result.frame, result.objects, up=up, caption=caption)
+        Image.fromarray(picture).save(partial / "preview.png")
         names = sorted(path.name for path in partial.iterdir())
     return [Path(folder) / name for name in names]
 

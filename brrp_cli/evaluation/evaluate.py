@@ -1,0 +1,229 @@
+"""`brrp eval` from request to report."""
+
+from __future__ import annotations
+
+import json
+import os
+import platform
+import sys
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from brrp_cli.evaluation.bootstrap import ROUNDS
+from brrp_cli.evaluation.folder import PARAMETERS, ROWS, claimed
+from brrp_cli.evaluation.report import write_report
+from brrp_cli.evaluation.rows import METRICS, Row, RowLog, table
+from brrp_cli.evaluation.run import Plan, collect, remaining, run_remaining
+from brrp_cli.evaluation.scenes import Scene, find_scenes
+from brrp_cli.evaluation.summary import (
+    VariantSummary,
+    as_record,
+    differences,
+    interval_record,
+    summarise,
+)
+from brrp_cli.evaluation.true_meshes import truth_cache
+from brrp_cli.evaluation.variants import Variant, expand, same_results, short_labels
+from brrp_cli.files import write_bytes
+from brrp_cli.methods.registry import METHODS
+from brrp_cli.progress import progress
+from brrp_cli.retrieval.choose import clip_folder, need_clip_folder, resolve_name
+from brrp_cli.retrieval.clip_files import find_clip_files
+from brrp_cli.version import __version__
+
+
+@dataclass(frozen=True)
+class Request:
+    """What the user asked for; see `brrp eval --help`."""
+
+    scenes: Path
+    output: Path
+    methods: list[str]
+    presets: list[str]
+    ks: list[int]
+    retrievers: list[str]
+    shifts: list[int]
+    data_root: Path | None = None
+    prior: Path | None = None
+    clip_dir: Path | None = None
+    noise: bool = False
+    selection: slice | None = None
+    seed: int = 0
+    device: str = "auto"
+    workers: int | None = None
+    pictures: bool = False
+    overwrite: bool = False
+
+
+@dataclass(frozen=True)
+class Result:
+    """lost : scene -> why it has no rows; files : what was written, below the output folder."""
+
+    summaries: list[VariantSummary]
+    labels: dict[Variant, str]
+    lost: dict[str, str]
+    files: list[str]
+
+
+def evaluate(request: Request, say: Callable[[str], None] = lambda text: None) -> Result:
+    """Run what was not run yet and write the report.
+
+    Errors: SceneError, PriorError, RetrievalError or MeshError before the work starts; OutputError
+    if the folder holds a different run and `overwrite` is false.
+    """
+    scenes = find_scenes(request.scenes, request.selection)
+    variants = expand(
+        request.methods,
+        request.presets,
+        request.ks,
+        [resolve_name(name, request.clip_dir) for name in request.retrievers],
+        request.shifts,
+    )
+    prior = _prior(request)
+    if any(variant.retriever == "clip" for variant in variants):
+        # A missing model is told now, not in every row.
+        find_clip_files(need_clip_folder(request.clip_dir))
+    parameters = _parameters(request, scenes, variants, prior)
+    workers = request.workers or len(os.sched_getaffinity(0))
+    labels = short_labels(variants)
+    plan = Plan(
+        scenes=scenes,
+        variants=variants,
+        data_root=request.data_root or find_data_root(scenes, request.scenes),
+        cache=truth_cache(),
+        prior=None if prior is None else Path(prior["path"]),
+        clip_dir=request.clip_dir,
+        noise=request.noise,
+        seed=request.seed,
+        device=request.device,
+        pictures=request.output / "pictures" if request.pictures else None,
+    )
+    with claimed(request.output, parameters, overwrite=request.overwrite) as path:
+        say(f"{len(scenes)} scenes, {workers} workers: {', '.join(labels.values())}")
+        log = RowLog(path)
+        lost: dict[str, str] = {}
+        todo = remaining(plan, log)
+        work = run_remaining(plan, log, todo, workers)
+        for ended, error in progress(work, "true meshes, then scenes", len(todo)):
+            if error is not None and isinstance(ended, Scene):
+                lost[ended.name] = str(error)
+            if error is not None:
+                say(f"{ended.name}: {error}")
+        rows = collect(plan, log, lost)
+        about = {
+            **parameters,
+            "prior": prior,
+            "command": " ".join(["brrp", *sys.argv[1:]]),
+            "machine": machine(),
+            "bootstrap_rounds": ROUNDS,
+            "same": {
+                labels[v]: labels[first]
+                for v, first in same_results(variants).items()
+                if v != first
+            },
+            "lost": lost,
+        }
+        summaries, files = _write(request.output, rows, variants, labels, about, request.seed)
+    return Result(summaries, labels, lost, files)
+
+
+def find_data_root(scenes: Sequence[Scene], folder: Path) -> Path:
+    """The folder beside or above the scenes below which their first mesh lies; `folder` if there
+    is none, which reading the mesh will tell."""
+    first = next((o.mesh_path for scene in scenes for o in scene.objects), "")
+    folder = folder.resolve()
+    for candidate in (folder, folder / "data", folder.parent / "data", folder.parent):
+        if (candidate / first).is_file():
+            return candidate
+    return folder
+
+
+def machine() -> str:
+    """What the times were measured on."""
+    import torch
+
+    model = platform.processor() or platform.machine()
+    info = Path("/proc/cpuinfo")
+    if info.exists():
+        lines = info.read_text().splitlines()
+        model = next(
+            (x.split(":", 1)[1].strip() for x in lines if x.startswith("model name")), model
+        )
+    return (
+        f"{model}, {os.cpu_count()} processors; {platform.system()}, Python "
+        f"{platform.python_version()}, torch {torch.__version__}"
+    )
+
+
+def _prior(request: Request) -> dict[str, str] | None:
+    """Path and digest, where a method needs a prior. Errors: PriorError."""
+    from brrp_cli.prior.locate import locate_prior
+    from brrp_cli.prior.store import open_prior
+
+    if not any(METHODS[name].uses_prior for name in request.methods):
+        return None
+    path, _ = locate_prior(request.prior)
+    return {"path": str(path), "digest": open_prior(path).digest}
+
+
+def _parameters(
+    request: Request,
+    scenes: Sequence[Scene],
+    variants: Sequence[Variant],
+    prior: dict[str, str] | None,
+) -> dict[str, Any]:
+    """What decides the rows."""
+    clip = clip_folder(request.clip_dir)
+    uses_clip = any(variant.retriever == "clip" for variant in variants)
+    return {
+        "brrp": __version__,
+        "scenes": str(request.scenes.resolve()),
+        "scenes_total": len(scenes),
+        "scenes_first": scenes[0].name,
+        "scenes_last": scenes[-1].name,
+        "prior_digest": None if prior is None else prior["digest"],
+        "clip": str(clip) if uses_clip else None,
+        "noise": request.noise,
+        "seed": request.seed,
+        "variants": {variant.label: variant.configuration for variant in variants},
+    }
+
+
+def _write(
+    folder: Path,
+    rows: list[Row],
+    variants: list[Variant],
+    labels: dict[Variant, str],
+    about: dict[str, Any],
+    seed: int,
+) -> tuple[list[VariantSummary], list[str]]:
+    """metrics.csv, summary.json, plots and report.md."""
+    from brrp_cli.evaluation.plots import write_plots
+
+    summaries = summarise(rows, variants, seed)
+    found = differences(rows, variants, seed, METRICS)
+    summary = {
+        **about,
+        "results": {labels[s.variant]: as_record(s) for s in summaries},
+        "differences": {
+            f"{labels[a]} - {labels[b]}": {name: interval_record(i) for name, i in d.items()}
+            for (a, b), d in found.items()
+        },
+    }
+    plots = write_plots(folder / "plots", summaries, labels)
+    write_bytes(folder / "metrics.csv", table(rows).encode())
+    write_bytes(folder / "summary.json", (json.dumps(summary, indent=1) + "\n").encode())
+    report = write_report(about, summaries, found, labels, plots)
+    write_bytes(folder / "report.md", report.encode())
+    pictures = ["pictures/"] if (folder / "pictures").is_dir() else []
+    return summaries, [
+        "report.md",
+        "metrics.csv",
+        "summary.json",
+        "plots/",
+        *pictures,
+        ROWS,
+        PARAMETERS,
+    ]

@@ -1,0 +1,214 @@
+"""One scene, in a worker: every variant, every object, one row each."""
+
+from __future__ import annotations
+
+from functools import cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from brrp_cli.config import Config
+from brrp_cli.errors import BrrpError
+from brrp_cli.evaluation.memory import peak_megabytes, reset_peak
+from brrp_cli.evaluation.perturb import shift_masks, with_noise
+from brrp_cli.evaluation.rows import STAGES, Row, RowLog, variant_columns
+from brrp_cli.evaluation.run import FAILED, Plan, lost_row
+from brrp_cli.evaluation.scenes import Scene
+from brrp_cli.evaluation.score_object import placement_error, score_probabilities, score_shape
+from brrp_cli.evaluation.true_meshes import close_truth
+from brrp_cli.evaluation.true_shape import TrueShape, true_shape
+from brrp_cli.evaluation.variants import Variant
+from brrp_cli.frames.frame import Frame
+from brrp_cli.methods.base import ObjectReconstruction
+from brrp_cli.methods.registry import METHODS, Setup
+from brrp_cli.prior.objects import PriorObject
+from brrp_cli.prior.store import Prior, open_prior
+from brrp_cli.retrieval.remember import RememberingRetriever
+from brrp_cli.seeds import child_rng
+
+if TYPE_CHECKING:
+    from brrp_cli.retrieval.base import Retriever
+
+# Objects with fewer pixels in the mask are not evaluated (published tables).
+MIN_PIXELS = 16
+
+# A worker reads the prior and its retrievers once, for all scenes that it is given.
+_prior = cache(open_prior)
+
+
+def evaluate_scene(plan: Plan, scene: Scene, variants: list[Variant], log: Path) -> None:
+    """Append the rows of every variant, each variant's as soon as they are known."""
+    rows = RowLog(log)
+    try:
+        clean = scene.view(plan.view)
+    except BrrpError as error:
+        rows.append(lost_row(scene.name, plan.view, v, str(error)) for v in variants)
+        return
+    seen = with_noise(clean, child_rng(plan.seed, "noise", scene.name)) if plan.noise else clean
+    truths = _truths(plan, scene, clean)
+    memory: dict[str, RememberingRetriever] = {}
+    for variant in variants:
+        frame = shift_masks(seen, variant.shift)
+        found, peak = _reconstruct(plan, scene, frame, variant, memory)
+        rows.append(
+            _row(plan, scene, variant, clean, object_id, truths, found, memory, peak)
+            for object_id in truths
+        )
+        if plan.pictures is not None:
+            _draw(plan.pictures, scene, frame, variant, found)
+
+
+def _truths(plan: Plan, scene: Scene, clean: Frame) -> dict[int, TrueShape | BrrpError]:
+    """The true shape of each object with enough pixels, or why there is none; by id."""
+    truths: dict[int, TrueShape | BrrpError] = {}
+    for object_id in clean.object_ids:
+        if np.count_nonzero(clean.segmap == object_id) < MIN_PIXELS:
+            continue
+        rng = child_rng(plan.seed, "truth", scene.name, object_id)
+        try:
+            meshes = close_truth(scene.object(object_id), plan.data_root, plan.cache)
+            truths[object_id] = true_shape(meshes, clean, rng)
+        except BrrpError as error:
+            truths[object_id] = error
+    return truths
+
+
+def _reconstruct(
+    plan: Plan,
+    scene: Scene,
+    frame: Frame,
+    variant: Variant,
+    memory: dict[str, RememberingRetriever],
+) -> tuple[dict[int, ObjectReconstruction] | BrrpError, float]:
+    """What the method found, by id, and the peak of memory in MB."""
+    setup = Setup(variant.config, plan.seed, plan.device)
+    reset_peak()
+    try:
+        if METHODS[variant.method].uses_prior:
+            assert plan.prior is not None
+            prior = _prior(plan.prior)
+            key = _memory_key(variant)
+            if key not in memory:
+                memory[key] = RememberingRetriever(_retriever(plan, scene, variant, prior))
+            setup = Setup(variant.config, plan.seed, plan.device, prior, memory[key])
+        found = METHODS[variant.method].run(frame, setup)
+    except BrrpError as error:
+        return error, peak_megabytes()
+    return {item.object_id: item for item in found}, peak_megabytes()
+
+
+def _memory_key(variant: Variant) -> str:
+    """Equal for variants that show the same frame to the same retriever."""
+    return f"{variant.shift} {variant.retrieval_key}"
+
+
+def _retriever(plan: Plan, scene: Scene, variant: Variant, prior: Prior) -> Retriever:
+    from brrp_cli.retrieval.given import TruthRetriever, UniformRetriever
+
+    assert variant.retriever is not None and plan.prior is not None
+    if variant.retriever == "truth":
+        return TruthRetriever(prior.names, {o.id: o.name for o in scene.objects})
+    if variant.retriever == "uniform":
+        return UniformRetriever(prior.names)
+    return _found_retriever(variant.retriever, plan.prior, variant.config, plan.seed, plan.clip_dir)
+
+
+@cache
+def _found_retriever(
+    name: str, prior: Path, config: Config, seed: int, clip_dir: Path | None
+) -> Retriever:
+    from brrp_cli.retrieval.choose import choose_retriever
+
+    return choose_retriever(name, _prior(prior), config, seed, clip_dir=clip_dir)
+
+
+@cache
+def _stored(prior: Path, name: str) -> PriorObject:
+    return _prior(prior).load(name)
+
+
+def _row(
+    plan: Plan,
+    scene: Scene,
+    variant: Variant,
+    clean: Frame,
+    object_id: int,
+    truths: dict[int, TrueShape | BrrpError],
+    found: dict[int, ObjectReconstruction] | BrrpError,
+    memory: dict[str, RememberingRetriever],
+    peak: float,
+) -> Row:
+    row: Row = {
+        "scene": scene.name,
+        "view": plan.view,
+        "object_id": object_id,
+        "name": scene.object(object_id).name,
+        "visible_pixels": int(np.count_nonzero(clean.segmap == object_id)),
+        "objects_in_view": len(truths),
+        **variant_columns(variant),
+        "peak_memory_mb": peak,
+    }
+    truth = truths[object_id]
+    if isinstance(found, BrrpError):
+        return {**row, "status": FAILED, "message": str(found)}
+    item = found.get(object_id)
+    if item is None:
+        return {**row, "status": FAILED, "message": "not in the masks that the method was shown"}
+    row |= {"status": item.status, "message": item.message, "points": item.n_points}
+    row |= _seconds(item, memory.get(_memory_key(variant)))
+    retriever = memory.get(_memory_key(variant))
+    if METHODS[variant.method].uses_prior and retriever is not None and plan.prior is not None:
+        row |= _retrieval(_prior(plan.prior).names, retriever, row["name"], item)
+    if isinstance(truth, BrrpError):
+        return {**row, "status": FAILED, "message": str(truth)}
+    if item.posterior is not None:
+        rng = child_rng(plan.seed, "score", scene.name, object_id)
+        scores, diagrams = score_probabilities(item.posterior, truth)
+        row |= {**score_shape(item.posterior, truth, rng), **scores, "diagrams": diagrams}
+    placed = [r for r in item.retrieved if r.T_cam_object is not None]
+    if placed and plan.prior is not None:
+        row["placement_error"] = placement_error(
+            placed[0], _stored(plan.prior, placed[0].name), truth
+        )
+    return row
+
+
+def _seconds(item: ObjectReconstruction, retriever: RememberingRetriever | None) -> dict[str, Any]:
+    """Seconds of each stage; a remembered answer counts as long as the first one took."""
+    seconds = dict(item.seconds)
+    if retriever is not None and item.object_id in retriever.seconds:
+        seconds["retrieval"] = retriever.seconds[item.object_id]
+    stages = {f"seconds_{s}": round(seconds[s], 4) for s in STAGES if s in seconds}
+    return {**stages, "seconds_total": round(sum(seconds.values()), 4)}
+
+
+def _retrieval(
+    names: list[str], retriever: RememberingRetriever, true_name: str, item: ObjectReconstruction
+) -> Row:
+    """Where the true object came; its rank is 1 where no other is more probable."""
+    row: Row = {
+        "in_prior": true_name in names,
+        "placed": sum(r.T_cam_object is not None for r in item.retrieved),
+    }
+    if item.retrieved:
+        row |= {"best": item.retrieved[0].name, "best_probability": item.retrieved[0].probability}
+    answer = retriever.answers.get(item.object_id)
+    if true_name in names and answer is not None:
+        mine = float(answer[names.index(true_name)])
+        row |= {"true_rank": 1 + int(np.sum(answer > mine)), "true_probability": mine}
+    return row
+
+
+def _draw(
+    folder: Path,
+    scene: Scene,
+    frame: Frame,
+    variant: Variant,
+    found: dict[int, ObjectReconstruction] | BrrpError,
+) -> None:
+    from brrp_cli.evaluation.pictures import write_picture
+
+    if not isinstance(found, BrrpError):
+        name = "_".join([scene.name, *variant.label.replace("=", "").split()])
+        write_picture(folder / f"{name}.png", frame, list(found.values()), variant)

@@ -1,0 +1,147 @@
+"""From rows to the figures of a report: means, intervals, and what has no value."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brrp_cli.evaluation.bootstrap import Interval, calibration_interval, mean_interval
+from brrp_cli.evaluation.rows import METRICS, STAGES, Row, variant_of
+from brrp_cli.evaluation.score_object import REGIONS
+from brrp_cli.evaluation.variants import Variant
+from brrp_cli.methods.base import FAILED, TOO_FEW_POINTS
+from brrp_cli.seeds import child_rng
+
+RETRIEVAL = ("true_first", "true_in_3", "true_probability", "placement_error")
+
+
+@dataclass(frozen=True)
+class VariantSummary:
+    """One variant over a set.
+
+    Attributes
+    ----------
+    objects : rows; failed : those without any reconstruction, which have no metric; empty : those
+        whose reconstruction holds nothing, which have IoU 0 and no Chamfer distance
+    figures : metric -> mean and interval, the set's expected calibration errors included
+    seconds : stage -> mean over objects; peak_memory_mb : largest
+    diagrams : region -> reliability sums (3, bins) of the set
+    """
+
+    variant: Variant
+    objects: int
+    failed: int
+    empty: int
+    figures: dict[str, Interval]
+    seconds: dict[str, float]
+    peak_memory_mb: float
+    diagrams: dict[str, NDArray[np.float64]]
+
+
+def summarise(rows: Sequence[Row], variants: Sequence[Variant], seed: int) -> list[VariantSummary]:
+    """The summary of each variant, in their order. The same rows and seed give the same numbers."""
+    return [
+        _one(variant, [r for r in rows if variant_of(r) == variant], seed) for variant in variants
+    ]
+
+
+def _one(variant: Variant, rows: list[Row], seed: int) -> VariantSummary:
+    scored = [row for row in rows if "diagrams" in row]
+    figures = {name: _mean(rows, name, seed) for name in METRICS}
+    diagrams = {}
+    for region in REGIONS:
+        found = [np.asarray(row["diagrams"][region], dtype=np.float64) for row in scored]
+        rng = child_rng(seed, "bootstrap", f"ece_{region}")
+        figures[f"ece_{region}"] = calibration_interval(found, [r["scene"] for r in scored], rng)
+        diagrams[region] = np.sum(found, axis=0) if found else np.zeros((3, 0))
+    known = [_with_ranks(row) for row in rows]
+    figures |= {name: _mean(known, name, seed) for name in RETRIEVAL}
+    return VariantSummary(
+        variant=variant,
+        objects=len(rows),
+        failed=sum(row["status"] in (FAILED, TOO_FEW_POINTS) for row in rows),
+        empty=sum(math.isnan(row.get("chamfer", math.nan)) for row in scored),
+        figures=figures,
+        seconds={stage: _average(rows, f"seconds_{stage}") for stage in (*STAGES, "total")},
+        peak_memory_mb=max((row.get("peak_memory_mb") or 0.0 for row in rows), default=math.nan),
+        diagrams=diagrams,
+    )
+
+
+def differences(
+    rows: Sequence[Row], variants: Sequence[Variant], seed: int, metrics: Sequence[str]
+) -> dict[tuple[Variant, Variant], dict[str, Interval]]:
+    """Mean difference, a variant less a baseline, over the objects that have a value in both.
+
+    The baselines are the variants without a prior; pairs differ in nothing else but the method.
+    """
+    values = {(variant_of(row), row["scene"], row["object_id"]): row for row in rows}
+    result = {}
+    for variant in variants:
+        for baseline in variants:
+            if variant.preset is None or baseline.preset is not None:
+                continue
+            if variant.shift != baseline.shift:
+                continue
+            pairs = [
+                (row["scene"], values[variant, scene, i], row)
+                for (v, scene, i), row in values.items()
+                if v == baseline and (variant, scene, i) in values
+            ]
+            result[variant, baseline] = {
+                name: mean_interval(
+                    [a.get(name, math.nan) - b.get(name, math.nan) for _, a, b in pairs],
+                    [scene for scene, _, _ in pairs],
+                    child_rng(seed, "bootstrap", name),
+                )
+                for name in metrics
+            }
+    return result
+
+
+def as_record(summary: VariantSummary) -> dict[str, Any]:
+    """Plain JSON: NaN is null, lengths in metres."""
+    return {
+        "variant": asdict(summary.variant),
+        "objects": summary.objects,
+        "failed": summary.failed,
+        "empty": summary.empty,
+        "metrics": {name: interval_record(i) for name, i in summary.figures.items()},
+        "seconds": {stage: _json(round(s, 4)) for stage, s in summary.seconds.items()},
+        "peak_memory_mb": _json(summary.peak_memory_mb),
+        "reliability": {
+            region: dict(zip(("points", "probability", "occupied"), sums.tolist(), strict=True))
+            for region, sums in summary.diagrams.items()
+        },
+    }
+
+
+def interval_record(interval: Interval) -> dict[str, Any]:
+    """Plain JSON of a figure."""
+    return {name: _json(value) for name, value in asdict(interval).items()}
+
+
+def _mean(rows: Sequence[Row], name: str, seed: int) -> Interval:
+    values = [row.get(name, math.nan) for row in rows]
+    rng = child_rng(seed, "bootstrap", name)
+    return mean_interval(values, [row["scene"] for row in rows], rng)
+
+
+def _average(rows: Sequence[Row], name: str) -> float:
+    values = [row[name] for row in rows if not math.isnan(row.get(name, math.nan))]
+    return float(np.mean(values)) if values else math.nan
+
+
+def _with_ranks(row: Row) -> Row:
+    """With 0 or 1 for the true object's place, where the prior holds it."""
+    rank = row.get("true_rank")
+    return row if rank is None else {**row, "true_first": rank == 1, "true_in_3": rank <= 3}
+
+
+def _json(value: float) -> float | None:
+    return None if isinstance(value, float) and math.isnan(value) else value

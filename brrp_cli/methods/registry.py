@@ -1,0 +1,70 @@
+"""The methods by name: each takes a frame and gives what it knows of every object in it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING, Any
+
+from brrp_cli.config import Config, VPrismConfig
+from brrp_cli.frames.frame import Frame
+from brrp_cli.methods.base import ObjectReconstruction
+
+if TYPE_CHECKING:
+    from brrp_cli.prior.store import Prior
+    from brrp_cli.retrieval.base import Retriever
+
+
+@dataclass(frozen=True)
+class Setup:
+    """What a method may need besides the frame; prior and retriever only where it uses a prior."""
+
+    config: Config
+    seed: int
+    device: str = "cpu"
+    prior: Prior | None = None
+    retriever: Retriever | None = None
+
+
+@dataclass(frozen=True)
+class Method:
+    """run : all objects of a frame, by id; configuration : what decides its results, plain JSON;
+    uses_prior : whether presets, k and retrievers mean something to it."""
+
+    run: Callable[[Frame, Setup], list[ObjectReconstruction]]
+    configuration: Callable[[Config], dict[str, Any]]
+    uses_prior: bool
+
+
+def _brrp(frame: Frame, setup: Setup) -> list[ObjectReconstruction]:
+    from brrp_cli.api import reconstruct
+
+    assert setup.prior is not None
+    result = reconstruct(
+        frame,
+        setup.prior,
+        config=setup.config,
+        retriever=setup.retriever,
+        seed=setup.seed,
+        device=setup.device,
+    )
+    for item in result.objects:
+        share = result.seconds["observation"] / len(result.objects)
+        item.seconds = {"observation": share, **item.seconds}
+    return result.objects
+
+
+def _vprism(frame: Frame, setup: Setup) -> list[ObjectReconstruction]:
+    from brrp_cli.methods.vprism import reconstruct_vprism
+
+    return reconstruct_vprism(frame, VPrismConfig(), setup.seed)
+
+
+def _vprism_configuration(config: Config) -> dict[str, Any]:
+    return asdict(VPrismConfig())
+
+
+METHODS = {
+    "brrp": Method(_brrp, Config.as_dict, uses_prior=True),
+    "vprism": Method(_vprism, _vprism_configuration, uses_prior=False),
+}
