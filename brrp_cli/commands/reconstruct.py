@@ -61,9 +61,9 @@ def command(
     """
     from brrp_cli.api import reconstruct
     from brrp_cli.frames.readers import read_frame
-    from brrp_cli.prior.locate import locate_prior
     from brrp_cli.prior.store import open_prior
     from brrp_cli.surface.results import check_output, write_results
+    from brrp_cli.which_prior import locate_prior
 
     output = output or frame_path.with_name(f"{frame_path.stem}_brrp")
     # What can be refused is refused before the work, not after it.

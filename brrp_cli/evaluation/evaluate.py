@@ -13,9 +13,10 @@ from typing import Any
 
 from brrp_cli.evaluation.bootstrap import ROUNDS
 from brrp_cli.evaluation.folder import PARAMETERS, ROWS, claimed
+from brrp_cli.evaluation.plan import Plan
 from brrp_cli.evaluation.report import write_report
 from brrp_cli.evaluation.rows import METRICS, Row, RowLog, table
-from brrp_cli.evaluation.run import Plan, collect, remaining, run_remaining
+from brrp_cli.evaluation.run import collect, remaining, run_remaining
 from brrp_cli.evaluation.scenes import Scene, find_scenes
 from brrp_cli.evaluation.summary import (
     VariantSummary,
@@ -159,8 +160,8 @@ def machine() -> str:
 
 def _prior(request: Request) -> dict[str, str] | None:
     """Path and digest, where a method needs a prior. Errors: PriorError."""
-    from brrp_cli.prior.locate import locate_prior
     from brrp_cli.prior.store import open_prior
+    from brrp_cli.which_prior import locate_prior
 
     if not any(METHODS[name].uses_prior for name in request.methods):
         return None

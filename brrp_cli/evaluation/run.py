@@ -5,36 +5,20 @@ from __future__ import annotations
 import logging
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import Any
 
 from brrp_cli.errors import BrrpError
-from brrp_cli.evaluation.rows import OBJECT, Row, RowLog, finished, variant_columns, variant_of
+from brrp_cli.evaluation.evaluate_scene import evaluate_scene
+from brrp_cli.evaluation.plan import Plan, lost_row
+from brrp_cli.evaluation.rows import Row, RowLog, finished, variant_columns, variant_of
 from brrp_cli.evaluation.scenes import Scene
+from brrp_cli.evaluation.true_meshes import close_truth
 from brrp_cli.evaluation.truth import TrueObject
 from brrp_cli.evaluation.variants import Variant, same_results
 from brrp_cli.prior.workers import run_tasks
 
 # A scene takes minutes; what takes so long will not end.
 TIME_LIMIT = 4 * 3600.0
-FAILED = "failed"
-
-
-@dataclass(frozen=True)
-class Plan:
-    """Everything that a worker has to know."""
-
-    scenes: list[Scene]
-    variants: list[Variant]
-    data_root: Path
-    cache: Path
-    prior: Path | None = None
-    clip_dir: Path | None = None
-    noise: bool = False
-    view: int = 0
-    seed: int = 0
-    device: str = "cpu"
-    pictures: Path | None = None
 
 
 @dataclass(frozen=True)
@@ -90,9 +74,6 @@ def run_remaining(
 
 def _work(plan: Plan, what: TrueObject | Scene, *rest: Any) -> None:
     """One task of a worker: a true mesh, or a scene with its variants and the log."""
-    from brrp_cli.evaluation.evaluate_scene import evaluate_scene
-    from brrp_cli.evaluation.true_meshes import close_truth
-
     # What goes wrong is in the rows; what is worth a note to one who reconstructs is not here.
     logging.getLogger().setLevel(logging.ERROR)
     if isinstance(what, Scene):
@@ -131,9 +112,3 @@ def in_order(
     ]
     # The sort is stable: variants stay in their order.
     return sorted(named, key=lambda row: (row["scene"], row["object_id"] or 0))
-
-
-def lost_row(scene: str, view: int, variant: Variant, message: str) -> Row:
-    """What stands for a view of which nothing is known."""
-    found = dict.fromkeys(OBJECT) | {"scene": scene, "view": view, "objects_in_view": 1}
-    return {**found, **variant_columns(variant), "status": FAILED, "message": message}

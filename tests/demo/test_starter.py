@@ -7,9 +7,9 @@ import pytest
 import trimesh
 
 from brrp_cli.demo.starter import starter_prior, write_shapes
-from brrp_cli.prior.locate import locate_prior
 from brrp_cli.prior.store import open_prior, verify_prior
 from brrp_cli.shapes.household import household_shapes
+from brrp_cli.which_prior import locate_prior
 
 
 def test_shapes_come_back_from_their_files_closed_and_in_metres(tmp_path):
