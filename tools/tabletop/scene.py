@@ -53,7 +53,7 @@ def make_scene(plan: Plan, number: int, check: bool) -> list[Distance]:
     cameras = [draw_camera(np.mean(centers, axis=0), plan.size, rng) for _ in range(plan.views)]
     pictures = render(models, poses, look, cameras, plan.size)
     folder = plan.output / f"{number:08d}"
-    with atomic_folder(folder, overwrite=plan.overwrite) as partial:
+    with atomic_folder(folder, overwrite=plan.overwrite, mark="objects.json") as partial:
         entries = [
             {
                 "id": i + 1,
