@@ -54,9 +54,8 @@ class LazyGroup(click.Group):
 
 @click.group(cls=LazyGroup, context_settings={"help_option_names": ["-h", "--help"]})
 @click.version_option(__version__, prog_name="brrp")
-@click.option("-q", "--quiet", is_flag=True, help="No progress bars, no notes; errors only.")
-@click.pass_context
-def main(ctx: click.Context, quiet: bool) -> None:
+@click.option("-q", "--quiet", is_flag=True, help="No progress bars and no notes.")
+def main(quiet: bool) -> None:
     """See one RGBD image, know every object's whole shape, and how sure that is.
 
     \b
@@ -64,8 +63,8 @@ def main(ctx: click.Context, quiet: bool) -> None:
       brrp build-prior meshes/ -o prior/
       brrp reconstruct frame.npz --prior prior/ -o out/
     """
-    ctx.obj = {"quiet": quiet}
-    logging.basicConfig(level=logging.ERROR if quiet else logging.INFO, format="%(message)s")
+    logging.basicConfig(format="%(message)s")
+    logging.getLogger().setLevel(logging.ERROR if quiet else logging.INFO)
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""Progress bars on stderr, silent with -q and where nobody looks."""
+"""Progress bars and notes on stderr, silent with -q."""
 
 from __future__ import annotations
 
@@ -13,6 +13,14 @@ T = TypeVar("T")
 def quiet() -> bool:
     """Whether `brrp -q` asked for errors only."""
     return logging.getLogger().getEffectiveLevel() >= logging.ERROR
+
+
+def note(text: str) -> None:
+    """Print what is of interest while a command works; its results go to stdout."""
+    import click
+
+    if not quiet():
+        click.echo(text, err=True)
 
 
 def progress(items: Iterable[T], label: str, total: int | None = None) -> Iterable[T]:

@@ -2,6 +2,7 @@ import json
 import re
 import subprocess
 import sys
+from pathlib import Path
 
 import click
 import pytest
@@ -101,3 +102,17 @@ def test_a_brrp_error_brings_its_exit_code() -> None:
 def test_any_other_exception_is_a_bug_and_keeps_its_traceback() -> None:
     done = fail_with(ZeroDivisionError("ours"))
     assert isinstance(done.exception, ZeroDivisionError)
+
+
+def test_quiet_leaves_results_and_errors_alone(tmp_path: Path) -> None:
+    import trimesh
+
+    trimesh.creation.box((0.1, 0.1, 0.1)).export(tmp_path / "box.ply")
+    arguments = ["build-prior", str(tmp_path), "--samples", "100", "-o"]
+    loud = CliRunner().invoke(main, [*arguments, str(tmp_path / "loud")])
+    quiet = CliRunner().invoke(main, ["-q", *arguments, str(tmp_path / "quiet")])
+    assert "Prior:" in loud.stderr
+    assert quiet.stderr == ""
+    assert quiet.stdout.startswith("1 objects (1 made")
+    failed = CliRunner().invoke(main, ["-q", "info", str(tmp_path / "nothing")])
+    assert failed.exit_code == 1 and "Error:" in failed.stderr

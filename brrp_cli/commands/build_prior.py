@@ -9,6 +9,7 @@ import click
 
 from brrp_cli.prior.locate import output_prior
 from brrp_cli.prior.parameters import UNITS, BuildParameters
+from brrp_cli.progress import note, quiet
 
 
 @click.command("build-prior")
@@ -32,9 +33,7 @@ from brrp_cli.prior.parameters import UNITS, BuildParameters
     "--workers", type=click.IntRange(1), help="Processes; as many as processors if not said."
 )
 @click.option("--overwrite", is_flag=True, help="Replace a prior that has other parameters.")
-@click.pass_context
 def command(
-    ctx: click.Context,
     meshes: Path,
     out: Path | None,
     descriptions: Path | None,
@@ -60,9 +59,7 @@ def command(
     from brrp_cli.prior.build import build_prior
 
     folder, how = output_prior(out)
-    quiet = ctx.obj["quiet"]
-    if not quiet:
-        click.echo(f"Prior: {folder} ({how})", err=True)
+    note(f"Prior: {folder} ({how})")
     report = build_prior(
         meshes,
         folder,
@@ -70,7 +67,7 @@ def command(
         descriptions=descriptions,
         workers=workers,
         overwrite=overwrite,
-        progress=not quiet,
+        progress=not quiet(),
     )
     manifest = report.manifest
     for failure in manifest.failed:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import click
 
 from brrp_cli.config import PRESETS, preset
+from brrp_cli.progress import note
 
 if TYPE_CHECKING:
     import trimesh
@@ -61,11 +62,11 @@ def command(output: Path, seed: int, preset_name: str, device: str, overwrite: b
     refuse_folder(output, overwrite=overwrite, mark=FRAME)
     check_writable(output.parent)
     prior = open_prior(starter_prior())
-    click.echo(f"Prior: {prior.path} (starter prior), {len(prior.names)} household shapes")
+    note(f"Prior: {prior.path} (starter prior), {len(prior.names)} household shapes")
     scene = make_scene(seed)
     config = preset(preset_name)
     retriever = choose_retriever("fitness", prior, config, seed)
-    click.echo(f"Scene: seed {seed}, {len(scene.truth)} objects. Retrieval: {retriever.name}")
+    note(f"Scene: seed {seed}, {len(scene.truth)} objects. Retrieval: {retriever.name}")
     result = reconstruct(
         scene.frame, prior, config=config, retriever=retriever, seed=seed, device=device
     )

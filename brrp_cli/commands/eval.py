@@ -11,6 +11,7 @@ import click
 
 from brrp_cli.config import PRESETS
 from brrp_cli.methods.registry import METHODS
+from brrp_cli.progress import note
 from brrp_cli.retrieval.choose import CLIP_DIR_VARIABLE, RETRIEVERS
 
 SOME_FAILED = 3
@@ -153,7 +154,7 @@ def command(
         pictures=pictures,
         overwrite=overwrite,
     )
-    result = evaluate(request, say=click.echo)
+    result = evaluate(request, say=note)
     for summary in result.summaries:
         iou, chamfer = summary.figures["iou"], summary.figures["chamfer"]
         click.echo(

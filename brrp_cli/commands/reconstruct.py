@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import click
 
 from brrp_cli.config import PRESETS, preset
+from brrp_cli.progress import note
 from brrp_cli.retrieval.choose import CLIP_DIR_VARIABLE, RETRIEVERS, choose_retriever
 
 if TYPE_CHECKING:
@@ -71,11 +72,11 @@ def command(
     check_output(output, frame, coordinates, overwrite=overwrite)
     located, how = locate_prior(prior_path)
     prior = open_prior(located)
-    click.echo(f"Prior: {located} ({how}), {len(prior.names)} objects")
+    note(f"Prior: {located} ({how}), {len(prior.names)} objects")
     config = preset(preset_name)
     config = replace(config, k=k) if k else config
     chosen = choose_retriever(retriever, prior, config, seed, clip_dir=clip_dir)
-    click.echo(f"Retrieval: {chosen.name}")
+    note(f"Retrieval: {chosen.name}")
     result = reconstruct(frame, prior, config=config, retriever=chosen, seed=seed, device=device)
     write_results(result, output, frame=coordinates, overwrite=overwrite)
     report(result)
@@ -92,7 +93,7 @@ def report(result: Reconstruction) -> None:
     """Print a line for each object."""
     for item in result.objects:
         best = item.retrieved[0] if item.retrieved else None
-        note = f"{best.name} {best.probability:.2f}" if best else ""
+        match = f"{best.name} {best.probability:.2f}" if best else ""
         seconds = f"{sum(item.seconds.values()):.1f} s" if item.seconds else ""
-        text = "; ".join(part for part in (note, item.message, seconds) if part)
-        click.echo(f"  object {item.object_id}: {item.status}  {text}")
+        text = "; ".join(part for part in (match, item.message, seconds) if part)
+        note(f"  object {item.object_id}: {item.status}  {text}")
