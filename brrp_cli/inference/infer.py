@@ -53,11 +53,7 @@ def infer_posterior(
     observed_labels = _labels(observed.labels, device)
     prior_points = [_local(component.points, center, device) for component in components]
     prior_labels = [_labels(component.labels, device) for component in components]
-    log_probabilities = (
-        torch.tensor(probabilities, dtype=torch.float32, device=device).log()
-        if components
-        else None
-    )
+    log_probabilities = _log_weights(probabilities, device) if components else None
     lambdas = Lambdas(config.lambda_observed, config.lambda_prior, config.lambda_norm)
     count = len(observed.points)
     batches = math.ceil(count / config.observed_batch)
@@ -91,6 +87,17 @@ def infer_posterior(
         grid=grid,
         reach=reach,
     )
+
+
+def _log_weights(probabilities: list[float], device: str) -> Tensor:
+    """ln P(c|R) up to a constant, the largest 0.
+
+    Only ratios matter to the mixture, and a component that is left alone after better ones could
+    not be registered may have a probability that is 0 in float32.
+    """
+    smallest = np.finfo(np.float64).tiny
+    log = np.log(np.maximum(np.asarray(probabilities, dtype=np.float64), smallest))
+    return torch.from_numpy((log - log.max()).astype(np.float32)).to(device)
 
 
 def _local(points: NDArray[np.floating], center: NDArray[np.floating], device: str) -> Tensor:

@@ -155,3 +155,19 @@ def test_transforming_the_prior_samples_moves_the_map():
     inside, outside = CENTER + [0.06, 0, 0], CENTER - [0.045, 0, 0]
     assert posterior.probability(inside[None])[0] > 0.5
     assert posterior.probability(outside[None])[0] < 0.5
+
+
+def test_a_component_that_is_left_alone_counts_in_full_however_improbable():
+    def posterior(probability):
+        return infer_posterior(
+            labelled(sphere, 2000, 2),
+            [labelled(sphere, 2000, 3)],
+            [probability],
+            CENTER,
+            CONFIG,
+            reach=0.12,
+            seed=0,
+        )
+
+    np.testing.assert_array_equal(posterior(0.0).weights, posterior(1.0).weights)
+    np.testing.assert_array_equal(posterior(1e-60).weights, posterior(1.0).weights)
