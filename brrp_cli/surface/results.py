@@ -51,7 +51,9 @@ def write_results(
         save_posteriors(posteriors, partial / "posterior.h5")
         record = json.dumps(result_record(result, frame), indent=2) + "\n"
         (partial / RECORD).write_text(record)
-        caption = f"retrieved by {result.retriever}" if result.retriever else result.method
+        caption = (
+            f"retrieved by {result.retriever}" if result.retriever else f"{result.method}, no prior"
+        )
         up = None if result.plane is None else result.plane.normal
         picture = preview(result.frame, result.objects, up=up, caption=caption)
         Image.fromarray(picture).save(partial / "preview.png")
