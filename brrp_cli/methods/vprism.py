@@ -36,6 +36,7 @@ class VPrismPosterior:
 
     def probability(self, points: NDArray[np.floating]) -> NDArray[np.float32]:
         """Probability (n,) that points (n, 3), metres, camera frame, belong to this object."""
+        points = np.asarray(points)
         inside = ((points >= self.bounds[0]) & (points <= self.bounds[1])).all(axis=1)
         classes = list(range(len(self.scene.mean)))
         mean, variance = self.scene.logits(points[inside], classes)
