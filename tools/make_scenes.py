@@ -14,8 +14,8 @@ the folder with YCB's archives unpacked, NNN_name/google_16k/textured.obj):
     python tools/make_scenes.py --meshes random_shapes --scenes 20 -o scenes/other
 
 and each with `--noise structured-light -o scenes/..._noise`. Sets to tune on: `--seed 1000`.
-`--light varied` draws colour and brightness of the light, gamma and pixel noise for each scene; what
-stands where stays as it is.
+`--light varied` draws colour and brightness of the light, gamma and pixel noise for each scene;
+what stands where stays as it is.
 
 Objects collide as convex hulls (tools/tabletop/settle.py says what that means). A pixel without a
 return has depth buffer 1.0, the far plane.

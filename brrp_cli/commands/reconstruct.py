@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from brrp_cli.commands.retriever_option import RetrieverName
 from brrp_cli.config import PRESETS, preset
 from brrp_cli.progress import note
 from brrp_cli.retrieval.choose import CLIP_DIR_VARIABLE, RETRIEVERS, choose_retriever
@@ -25,7 +26,13 @@ SOME_FAILED = 3
 @click.option("-o", "--output", type=click.Path(path_type=Path), help="[default: FRAME_brrp/]")
 @click.option("--preset", "preset_name", type=click.Choice(list(PRESETS)), default="default")
 @click.option("--k", type=click.IntRange(min=1), help="Retrieved objects. [default: the preset's]")
-@click.option("--retriever", type=click.Choice(RETRIEVERS), default="auto", show_default=True)
+@click.option(
+    "--retriever",
+    type=RetrieverName(RETRIEVERS),
+    default="auto",
+    show_default=True,
+    help=f"{', '.join(RETRIEVERS)}, or a JSON or CSV file with probabilities.",
+)
 @click.option(
     "--clip-dir",
     type=click.Path(path_type=Path),
@@ -94,6 +101,8 @@ def report(result: Reconstruction) -> None:
     for item in result.objects:
         best = item.retrieved[0] if item.retrieved else None
         match = f"{best.name} {best.probability:.2f}" if best else ""
+        if item.unknown_probability >= 0.5:
+            match += f" (not in the prior: {item.unknown_probability:.2f})"
         seconds = f"{sum(item.seconds.values()):.1f} s" if item.seconds else ""
         text = "; ".join(part for part in (match, item.message, seconds) if part)
         note(f"  object {item.object_id}: {item.status}  {text}")

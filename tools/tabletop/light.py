@@ -36,9 +36,7 @@ def draw_light(rng: np.random.Generator) -> Light:
     return Light(brightness * np.array([root, tint, 1 / root]), gamma, noise)
 
 
-def relight(
-    rgb: NDArray[np.uint8], light: Light, rng: np.random.Generator
-) -> NDArray[np.uint8]:
+def relight(rgb: NDArray[np.uint8], light: Light, rng: np.random.Generator) -> NDArray[np.uint8]:
     """The image (H, W, 3) in that light; what becomes too bright is white, as in a camera."""
     linear = (rgb / 255.0) ** light.gamma * light.gain
     noisy = 255 * linear + rng.normal(0.0, light.noise, rgb.shape)
