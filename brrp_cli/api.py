@@ -103,9 +103,9 @@ def reconstruct(
 
     method : "brrp", which needs a prior, or "vprism", which has none, runs on the CPU and takes
     the surface alone from `config`
-    retriever : P(c|R); without one, CLIP if `BRRP_CLIP_DIR` is set and registration fitness
-    otherwise. An object that cannot be reconstructed gets a status; the others still are. The
-    frame is never changed. The same seed gives the same result.
+    retriever : P(c|R); without one, CLIP if `BRRP_CLIP_DIR` is set, else appearance, else (with a
+    prior of an older brrp) registration fitness. An object that cannot be reconstructed gets a
+    status; the others still are. The frame is never changed. The same seed gives the same result.
 
     Errors: BrrpError for an unknown method, or a prior or retriever that it lacks or cannot use.
     """

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import click
 from click.core import ParameterSource
 
+from brrp_cli.commands.retriever_option import RetrieverName
 from brrp_cli.config import PRESETS, preset
 from brrp_cli.methods.registry import METHODS
 from brrp_cli.progress import note
@@ -39,7 +40,13 @@ OF_A_PRIOR = ("prior_path", "preset_name", "k", "retriever", "clip_dir")
 )
 @click.option("--preset", "preset_name", type=click.Choice(list(PRESETS)), default="default")
 @click.option("--k", type=click.IntRange(min=1), help="Retrieved objects. [default: the preset's]")
-@click.option("--retriever", type=click.Choice(RETRIEVERS), default="auto", show_default=True)
+@click.option(
+    "--retriever",
+    type=RetrieverName(RETRIEVERS),
+    default="auto",
+    show_default=True,
+    help=f"{', '.join(RETRIEVERS)}, or a JSON or CSV file with probabilities.",
+)
 @click.option(
     "--clip-dir",
     type=click.Path(path_type=Path),
@@ -144,6 +151,8 @@ def report(result: Reconstruction) -> None:
     for item in result.objects:
         best = item.retrieved[0] if item.retrieved else None
         match = f"{best.name} {best.probability:.2f}" if best else ""
+        if item.unknown_probability >= 0.5:
+            match += f" (not in the prior: {item.unknown_probability:.2f})"
         seconds = f"{sum(item.seconds.values()):.1f} s" if item.seconds else ""
         text = "; ".join(part for part in (match, item.message, seconds) if part)
         note(f"  object {item.object_id}: {item.status}  {text}")

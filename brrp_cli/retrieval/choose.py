@@ -14,7 +14,9 @@ if TYPE_CHECKING:
     from brrp_cli.retrieval.base import Retriever
 
 CLIP_DIR_VARIABLE = "BRRP_CLIP_DIR"
-RETRIEVERS = ("auto", "clip", "fitness")
+# In place of a name, a file with probabilities may stand.
+RETRIEVERS = ("auto", "clip", "appearance", "both", "fitness", "uniform")
+USE_CLIP = ("clip", "both")
 
 
 def clip_folder(clip_dir: Path | None) -> Path | None:
@@ -35,28 +37,58 @@ def need_clip_folder(clip_dir: Path | None) -> Path:
     return folder
 
 
-def resolve_name(name: str, clip_dir: Path | None = None) -> str:
+def resolve_name(name: str, clip_dir: Path | None = None, prior: Prior | None = None) -> str:
     """What `auto` means here; other names mean themselves."""
     if name != "auto":
         return name
-    return "clip" if clip_folder(clip_dir) else "fitness"
+    if clip_folder(clip_dir):
+        return "clip"
+    return "appearance" if prior is None or prior.manifest.appearance else "fitness"
 
 
 def choose_retriever(
     name: str, prior: Prior, config: Config, seed: int, *, clip_dir: Path | None = None
 ) -> Retriever:
-    """The retriever of that name. `auto` is CLIP where a folder with it is named, else fitness.
+    """The retriever of that name, or the one that reads the file of that name.
+
+    `auto` is CLIP where a folder with it is named, else appearance where the prior knows it, else
+    fitness.
 
     clip_dir : folder with CLIP as ONNX; without it, the one that BRRP_CLIP_DIR names.
     """
-    name = resolve_name(name, clip_dir)
+    name = resolve_name(name, clip_dir, prior)
+    if name == "both":
+        from brrp_cli.retrieval.both import BothRetriever
+
+        return BothRetriever(
+            _one("clip", prior, config, seed, clip_dir),
+            _one("appearance", prior, config, seed, clip_dir),
+        )
+    return _one(name, prior, config, seed, clip_dir)
+
+
+def _one(name: str, prior: Prior, config: Config, seed: int, clip_dir: Path | None) -> Retriever:
+    if name == "appearance":
+        from brrp_cli.retrieval.appearance import AppearanceRetriever
+
+        return AppearanceRetriever(prior, config, seed)
     if name == "fitness":
         from brrp_cli.retrieval.fitness import FitnessRetriever
 
         return FitnessRetriever(prior, config, seed)
+    if name == "uniform":
+        from brrp_cli.retrieval.given import UniformRetriever
+
+        return UniformRetriever(prior.names)
     if name == "clip":
         from brrp_cli.retrieval.clip import ClipRetriever
 
         folder = need_clip_folder(clip_dir)
         return ClipRetriever(folder, [prior.descriptions[name] for name in prior.names])
-    raise RetrievalError("No such retriever", found=name, expected=", ".join(RETRIEVERS))
+    if Path(name).is_file():
+        from brrp_cli.retrieval.table import TableRetriever
+
+        return TableRetriever(Path(name), prior.names)
+    raise RetrievalError(
+        "No such retriever", found=name, expected=f"{', '.join(RETRIEVERS)}, or a file"
+    )

@@ -156,6 +156,7 @@ def _object_record(item: ObjectReconstruction, T_target_cam: NDArray[np.float64]
         "points": item.n_points,
         "mesh": None if item.surface is None else mesh_name(item.object_id),
         **({} if item.surface is None else _surface_record(item.surface, T_target_cam)),
+        "not_in_prior": item.unknown_probability,
         "retrieved": [_retrieved_record(r, T_target_cam) for r in item.retrieved],
         "seconds": _rounded(item.seconds),
     }
