@@ -114,6 +114,7 @@ def reconstruct(
     if prior is None:
         return _vprism(frame, config, seed)
     from brrp_cli.methods.brrp import reconstruct_object
+    from brrp_cli.methods.hypothesise import reconstruct_by_hypotheses
     from brrp_cli.retrieval.choose import choose_retriever
 
     check_features(prior, config)
@@ -127,8 +128,12 @@ def reconstruct(
     seconds["observation"] = time.perf_counter() - start
 
     def one(observation: ObjectObservation) -> ObjectReconstruction:
-        return reconstruct_object(
-            frame, observation, prior, retriever, config, seed=seed, device=device
+        if config.hypotheses is None:
+            return reconstruct_object(
+                frame, observation, prior, retriever, config, seed=seed, device=device
+            )
+        return reconstruct_by_hypotheses(
+            frame, scene.plane, observation, prior, retriever, config, seed=seed, device=device
         )
 
     objects = []

@@ -86,8 +86,130 @@ class SurfaceConfig:
 
 
 @dataclass(frozen=True)
+class EvidenceConfig:
+    """What a frame says of a placement: shares of observed points and of model surface.
+
+    near : standard deviation of the Gaussian of observed points' distances to the model; far : an
+    observed point further away counts as this far; distance : weight of those distances
+    contradiction : weight of model surface in free space and below the plane, which counts from
+    `tolerance` on and fully from `tolerance + slope`
+    """
+
+    near: float = 0.004
+    far: float = 0.02
+    distance: float = 0.5
+    contradiction: float = 1.5
+    tolerance: float = 0.003
+    slope: float = 0.012
+
+
+@dataclass(frozen=True)
+class SearchConfig:
+    """Hypotheses about one stored object's pose.
+
+    Starts are `matchings` feature matchings and every resting pose turned `turns` times. The best
+    `coarse` of them are refined and judged, the best `fine` of those again. The best `rescaled`
+    are then tried at `scales` times the true size; evidence falls by scale_cost * ln(scale)^2.
+    """
+
+    turns: int = 24
+    matchings: int = 4
+    matching: RegistrationConfig = field(
+        default_factory=lambda: RegistrationConfig(iterations=10_000)
+    )
+    coarse: int = 24
+    coarse_distance: float = 0.03
+    coarse_points: int = 400
+    fine: int = 8
+    fine_distance: float = 0.01
+    fine_points: int = 1000
+    seen_points: int = 150
+    scales: tuple[float, ...] = (0.8, 0.9, 1.1, 1.25)
+    rescaled: int = 2
+    scale_distance: float = 0.015
+    scale_cost: float = 0.6
+    kept: int = 6
+    evidence: EvidenceConfig = field(default_factory=EvidenceConfig)
+
+
+@dataclass(frozen=True)
+class WeighConfig:
+    """Weights of hypotheses: P(c|R) exp(sharpness * evidence).
+
+    The hypothesis that the object is none of the stored ones has the evidence `unknown_evidence`
+    and a probability within [least_unknown, most_unknown]; no hypothesis counts as less probable
+    than `least_share`, since a retriever may be wrong.
+    """
+
+    sharpness: float = 25.0
+    unknown_evidence: float = 0.65
+    least_unknown: float = 0.1
+    most_unknown: float = 0.9
+    least_share: float = 1e-3
+
+
+@dataclass(frozen=True)
+class MeanConfig:
+    """Mean functions of hypotheses, logits on a lattice of about `nodes` nodes.
+
+    A placed shape is -(signed distance - growth) / width, limited to +-limit; evidence under `sure`
+    widens it by `doubt` for each unit. The hull of what was seen is -(distance) / hull_width,
+    between -limit and hull_limit. Space that lies more than `carve_depth` in front of the measured
+    depth, or `carve_plane` below the plane, is empty.
+    """
+
+    nodes: int = 100_000
+    growth: float = 0.0015
+    width: float = 0.002
+    sure: float = 0.85
+    doubt: float = 0.02
+    limit: float = 5.0
+    hull_width: float = 0.005
+    hull_limit: float = 1.0
+    carve_depth: float = 0.006
+    carve_plane: float = 0.004
+
+
+@dataclass(frozen=True)
+class FittedMapConfig:
+    """A Hilbert map whose hinge points fill the box of what was seen and of the hypotheses.
+
+    hinges : about so many, no closer than `least_spacing`; margin : of the box
+    behind : observed surface points are taken this far behind the surface, where they are inside
+    start : standard deviation of the particles' first weights
+    """
+
+    hinges: int = 1000
+    least_spacing: float = 0.01
+    margin: float = 0.02
+    feature_floor: float = 1e-7
+    particles: int = 8
+    steps: int = 40
+    learning_rate: float = 0.1
+    batch: int = 1024
+    start: float = 0.3
+    behind: float = 0.004
+    lambda_observed: float = 50.0
+    lambda_norm: float = 0.5
+
+
+@dataclass(frozen=True)
+class HypothesesConfig:
+    """What takes the place of the scale scan and of the fixed grid of hinge points."""
+
+    search: SearchConfig = field(default_factory=SearchConfig)
+    weigh: WeighConfig = field(default_factory=WeighConfig)
+    mean: MeanConfig = field(default_factory=MeanConfig)
+    map: FittedMapConfig = field(default_factory=FittedMapConfig)
+
+
+@dataclass(frozen=True)
 class Config:
-    """The whole method. `preset` names where the values came from."""
+    """The whole method. `preset` names where the values came from.
+
+    hypotheses : None is the paper's way, `registration` and `inference`, which mean nothing
+    otherwise
+    """
 
     preset: str = "default"
     k: int = 3
@@ -96,13 +218,14 @@ class Config:
     observation: ObservationConfig = field(default_factory=ObservationConfig)
     inference: InferenceConfig = field(default_factory=InferenceConfig)
     surface: SurfaceConfig = field(default_factory=SurfaceConfig)
+    hypotheses: HypothesesConfig | None = field(default_factory=HypothesesConfig)
 
     def as_dict(self) -> dict[str, Any]:
         """Plain numbers, for JSON and HDF5."""
         return asdict(self)
 
 
-PRESETS = {"paper": Config(preset="paper"), "default": Config(preset="default")}
+PRESETS = {"paper": Config(preset="paper", hypotheses=None), "default": Config(preset="default")}
 
 
 def preset(name: str) -> Config:

@@ -48,6 +48,15 @@ def mean_bce(weights: Tensor, samples: Samples) -> tuple[Tensor, Tensor]:
     return loss, residual @ samples.phi
 
 
+def logistic_score(weights: Tensor, phi: Tensor, labels: Tensor, mean: Tensor) -> Tensor:
+    """Gradient (P, D) of the mean binary cross-entropy of logits mean + w . phi.
+
+    weights : (P, D); phi : (n, D); labels : (n,); mean : (P, n), a logit of each particle's own.
+    """
+    logits = mean + weights @ phi.mT
+    return (torch.sigmoid(logits) - labels) @ phi / logits.shape[-1]
+
+
 def log_density(
     weights: Tensor,
     observed: Samples,

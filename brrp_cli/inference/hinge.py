@@ -6,6 +6,7 @@ the grid. The Gaussian is separable: a feature is the product of three factors, 
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import torch
@@ -14,46 +15,42 @@ from torch import Tensor
 
 @dataclass(frozen=True)
 class HingeGrid:
-    """`per_axis`^3 hinge points in a cube of half-width `half_width` metres around the origin.
+    """Hinge points lower + spacing * (i, j, k), metres from the map's centre; `spacing` is the
+    width of the kernel too.
 
-    Hinge (i, j, k) is number 1 + (i * per_axis + j) * per_axis + k of a weight vector; number 0 is
-    the bias.
+    lower : coordinates of the first one; counts : how many along each axis. Hinge (i, j, k) is
+    number 1 + (i * ny + j) * nz + k of a weight vector; number 0 is the bias. Kernel values under
+    `floor` are 0, as in the authors' code.
     """
 
-    per_axis: int
-    half_width: float
+    lower: tuple[float, float, float]
+    counts: tuple[int, int, int]
+    spacing: float
     floor: float
-
-    @property
-    def spacing(self) -> float:
-        """Distance of neighbouring hinge points, and width of the kernel, metres."""
-        return 2 * self.half_width / (self.per_axis - 1)
 
     @property
     def dimension(self) -> int:
         """Length of a weight vector."""
-        return self.per_axis**3 + 1
+        return math.prod(self.counts) + 1
 
 
-def axis_factors(coordinates: Tensor, grid: HingeGrid) -> Tensor:
-    """Kernels along one axis (..., per_axis) of coordinates (...), metres from the centre."""
-    hinges = torch.linspace(
-        -grid.half_width,
-        grid.half_width,
-        grid.per_axis,
-        dtype=coordinates.dtype,
-        device=coordinates.device,
-    )
+def cubic_grid(per_axis: int, half_width: float, floor: float) -> HingeGrid:
+    """`per_axis`^3 hinge points in a cube of half-width `half_width` metres around the origin."""
+    spacing = 2 * half_width / (per_axis - 1)
+    low = -half_width
+    return HingeGrid((low, low, low), (per_axis, per_axis, per_axis), spacing, floor)
+
+
+def axis_factors(coordinates: Tensor, grid: HingeGrid, axis: int) -> Tensor:
+    """Kernels along one axis (..., counts[axis]) of coordinates (...), metres from the centre."""
+    steps = torch.arange(grid.counts[axis], dtype=coordinates.dtype, device=coordinates.device)
+    hinges = grid.lower[axis] + grid.spacing * steps
     return torch.exp(-(((coordinates[..., None] - hinges) / grid.spacing) ** 2))
 
 
 def features(points: Tensor, grid: HingeGrid) -> Tensor:
-    """phi (..., H + 1) of points (..., 3), metres from the grid's centre.
-
-    Kernel values under `grid.floor` are 0, as in the authors' code.
-    """
-    factors = axis_factors(points, grid)
-    x, y, z = factors.unbind(dim=-2)
+    """phi (..., H + 1) of points (..., 3), metres from the map's centre."""
+    x, y, z = (axis_factors(points[..., axis], grid, axis) for axis in range(3))
     kernel = x[..., :, None, None] * y[..., None, :, None] * z[..., None, None, :]
     kernel = kernel.flatten(start_dim=-3)
     kernel = torch.where(kernel < grid.floor, 0.0, kernel)
@@ -66,8 +63,8 @@ def lattice_logits(weights: Tensor, axes: tuple[Tensor, Tensor, Tensor], grid: H
     Contracts one axis after the other and never forms a feature. Only the floor is left out, which
     changes a logit by at most floor * |w|_1.
     """
-    shape = (weights.shape[0], grid.per_axis, grid.per_axis, grid.per_axis)
-    x, y, z = (axis_factors(axis, grid) for axis in axes)
+    shape = (weights.shape[0], *grid.counts)
+    x, y, z = (axis_factors(each, grid, axis) for axis, each in enumerate(axes))
     volume = torch.einsum("pijk,zk->pijz", weights[:, 1:].reshape(shape), z)
     volume = torch.einsum("pijz,yj->piyz", volume, y)
     volume = torch.einsum("piyz,xi->pxyz", volume, x)

@@ -12,7 +12,7 @@ from torch import Tensor
 
 from brrp_cli.config import InferenceConfig
 from brrp_cli.inference.density import Lambdas, Samples, log_density
-from brrp_cli.inference.hinge import HingeGrid, features
+from brrp_cli.inference.hinge import HingeGrid, cubic_grid, features
 from brrp_cli.inference.posterior import HilbertPosterior
 from brrp_cli.inference.svgd import run_svgd
 
@@ -27,7 +27,7 @@ class LabelledPoints:
 
 def hinge_grid(config: InferenceConfig) -> HingeGrid:
     """The grid of hinge points that a configuration asks for."""
-    return HingeGrid(config.hinges_per_axis, config.hinge_half_width, config.feature_floor)
+    return cubic_grid(config.hinges_per_axis, config.hinge_half_width, config.feature_floor)
 
 
 def infer_posterior(

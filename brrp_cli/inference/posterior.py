@@ -49,8 +49,16 @@ class HilbertPosterior:
         """Variance over particles of w . phi, (n,)."""
         return np.asarray(self.logits(points).var(axis=0))
 
+    def surface_uncertainty(self, vertices: NDArray[np.floating]) -> NDArray[np.float32]:
+        """`uncertainty` (n,) at vertices (n, 3)."""
+        return self.uncertainty(vertices)
+
     def probability_volume(self, axes: Axes) -> NDArray[np.float32]:
         """Occupancy probability (nx, ny, nz) on a lattice of camera-frame coordinates, metres."""
+        return mean_occupancy(self.logit_volume(axes))
+
+    def logit_volume(self, axes: Axes) -> NDArray[np.float32]:
+        """w . phi (P, nx, ny, nz) on a lattice of camera-frame coordinates, metres."""
         local = tuple(
             torch.from_numpy((np.asarray(axis, np.float64) - middle).astype(np.float32))
             for axis, middle in zip(axes, self.center, strict=True)
@@ -58,7 +66,7 @@ class HilbertPosterior:
         logits = lattice_logits(
             torch.from_numpy(self.weights), (local[0], local[1], local[2]), self.grid
         )
-        return mean_occupancy(logits.numpy())
+        return np.asarray(logits.numpy())
 
 
 def mean_occupancy(logits: NDArray[np.floating]) -> NDArray[np.float32]:

@@ -1,8 +1,11 @@
 """posterior.h5: the posterior of every object of a frame, to be asked again later.
 
     /                   schema (int), frame ("camera"), units ("metre")
-    /objects/ID         center (3), reach, hinge_half_width, feature_floor, hinges_per_axis
+    /objects/ID         center (3), reach, hinge_lower (3), hinge_counts (3), hinge_spacing,
+                        feature_floor; with prior means also mean_lower (3), mean_spacing, outside
     /objects/ID/weights (P, H + 1) float32
+    /objects/ID/mean    (C, nx, ny, nz) float16, logits, with prior means
+    /objects/ID/which   (P,) int64, the mean of each particle, with prior means
 
 These are BRRP's particles; for what V-PRISM leaves see `brrp_cli/methods/vprism_file.py`.
 Points are asked in the camera frame, metres, whatever frame the meshes were written in.
@@ -18,6 +21,8 @@ import numpy as np
 
 from brrp_cli.errors import BrrpError
 from brrp_cli.inference.hinge import HingeGrid
+from brrp_cli.inference.hypothesis_posterior import HypothesisPosterior
+from brrp_cli.inference.mean import MeanLattice
 from brrp_cli.inference.posterior import HilbertPosterior
 from brrp_cli.methods.base import OccupancyPosterior
 from brrp_cli.methods.vprism import VPrismPosterior
@@ -26,7 +31,7 @@ from brrp_cli.methods.vprism_file import read_map, read_object, write_map, write
 if TYPE_CHECKING:
     import h5py
 
-SCHEMA = 1
+SCHEMA = 2
 MAP = "map"
 
 
@@ -48,6 +53,9 @@ def save_posteriors(posteriors: Mapping[int, OccupancyPosterior], path: Path) ->
                 write_object(group, posterior)
             elif isinstance(posterior, HilbertPosterior):
                 _write(group, posterior)
+            elif isinstance(posterior, HypothesisPosterior):
+                _write(group, posterior.correction)
+                _write_mean(group, posterior)
             else:
                 raise TypeError(f"no file format for {type(posterior).__name__}")
 
@@ -55,14 +63,33 @@ def save_posteriors(posteriors: Mapping[int, OccupancyPosterior], path: Path) ->
 def _write(group: h5py.Group, posterior: HilbertPosterior) -> None:
     group.attrs["center"] = posterior.center
     group.attrs["reach"] = posterior.reach
-    group.attrs["hinges_per_axis"] = posterior.grid.per_axis
-    group.attrs["hinge_half_width"] = posterior.grid.half_width
+    group.attrs["hinge_lower"] = posterior.grid.lower
+    group.attrs["hinge_counts"] = posterior.grid.counts
+    group.attrs["hinge_spacing"] = posterior.grid.spacing
     group.attrs["feature_floor"] = posterior.grid.floor
     group.create_dataset(
         "weights",
         data=posterior.weights,
         chunks=posterior.weights.shape,
         fletcher32=True,
+    )
+
+
+def _write_mean(group: h5py.Group, posterior: HypothesisPosterior) -> None:
+    mean = posterior.mean
+    group.attrs["mean_lower"] = mean.lower
+    group.attrs["mean_spacing"] = mean.spacing
+    group.attrs["outside"] = mean.outside
+    group.create_dataset(
+        "mean",
+        data=mean.values,
+        chunks=(1, *mean.values.shape[1:]),
+        compression="gzip",
+        shuffle=True,
+        fletcher32=True,
+    )
+    group.create_dataset(
+        "which", data=posterior.which, chunks=posterior.which.shape, fletcher32=True
     )
 
 
@@ -98,15 +125,27 @@ def open_posterior(path: str | Path) -> dict[int, OccupancyPosterior]:
         ) from error
 
 
-def _read(group: h5py.Group) -> HilbertPosterior:
+def _read(group: h5py.Group) -> OccupancyPosterior:
     attributes = group.attrs
-    return HilbertPosterior(
+    x, y, z = (float(v) for v in attributes["hinge_lower"])
+    nx, ny, nz = (int(n) for n in attributes["hinge_counts"])
+    particles = HilbertPosterior(
         weights=np.asarray(group["weights"], dtype=np.float32),
         center=np.asarray(attributes["center"], dtype=np.float64),
         grid=HingeGrid(
-            int(attributes["hinges_per_axis"]),
-            float(attributes["hinge_half_width"]),
+            (x, y, z),
+            (nx, ny, nz),
+            float(attributes["hinge_spacing"]),
             float(attributes["feature_floor"]),
         ),
         reach=float(attributes["reach"]),
     )
+    if "mean" not in group:
+        return particles
+    mean = MeanLattice(
+        lower=np.asarray(attributes["mean_lower"], dtype=np.float64),
+        spacing=float(attributes["mean_spacing"]),
+        values=np.asarray(group["mean"], dtype=np.float16),
+        outside=float(attributes["outside"]),
+    )
+    return HypothesisPosterior(mean, np.asarray(group["which"], dtype=np.int64), particles)

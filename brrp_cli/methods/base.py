@@ -36,7 +36,11 @@ class OccupancyPosterior(Protocol):
         """Occupancy probability (nx, ny, nz) on a lattice of camera-frame coordinates, metres."""
 
     def uncertainty(self, points: NDArray[np.floating]) -> NDArray[np.float32]:
-        """How unsure (n,), >= 0, in the method's own unit (BRRP: variance of the logits)."""
+        """How unsure (n,), >= 0, in the method's own unit: what ranks errors of occupancy."""
+
+    def surface_uncertainty(self, vertices: NDArray[np.floating]) -> NDArray[np.float32]:
+        """How unsure (n,), >= 0, the surface is at its own vertices (n, 3), where occupancy is 0.5
+        everywhere; in the method's own unit."""
 
 
 @dataclass(frozen=True)
@@ -64,7 +68,8 @@ class Retrieved:
 
     T_cam_object maps the stored object's normalised coordinates to the camera frame (a
     similarity); None where registration found no inlier. fitness: share of observed points with
-    an inlier, 0 to 1.
+    an inlier, 0 to 1. evidence : what the frame says for the best placement, 1 at best; weight : of
+    the object in the posterior; both None where placements are not verified.
     """
 
     name: str
@@ -73,6 +78,8 @@ class Retrieved:
     scale: float | None = None
     inliers: int = 0
     fitness: float = 0.0
+    evidence: float | None = None
+    weight: float | None = None
 
 
 @dataclass
@@ -85,6 +92,7 @@ class ObjectReconstruction:
     message : for people; may also qualify an "ok"
     n_points : valid observed points; observed : (n, 3) those points, metres, camera frame;
     center : (3,) centre of their bounding box
+    unknown_weight : of that in the posterior; None where it has none
     posterior, surface : None unless the object got that far
     unknown_probability : that the prior does not hold the object; 0 where retrieval cannot tell
     seconds : time of each stage
@@ -98,6 +106,7 @@ class ObjectReconstruction:
     observed: NDArray[np.float32] | None = None
     retrieved: list[Retrieved] = field(default_factory=list)
     unknown_probability: float = 0.0
+    unknown_weight: float | None = None
     posterior: OccupancyPosterior | None = None
     surface: Surface | None = None
     seconds: dict[str, float] = field(default_factory=dict)

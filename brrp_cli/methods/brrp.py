@@ -1,10 +1,6 @@
-"""BRRP: retrieve, register, infer (paper, section IV)."""
+"""BRRP as the paper has it: retrieve, register, infer (section IV)."""
 
 from __future__ import annotations
-
-import time
-from collections.abc import Iterator
-from contextlib import contextmanager
 
 import numpy as np
 
@@ -14,6 +10,7 @@ from brrp_cli.frames.observe import ObjectObservation
 from brrp_cli.geometry import transform_points
 from brrp_cli.inference.infer import LabelledPoints, infer_posterior
 from brrp_cli.methods.base import OK, ObjectReconstruction, Retrieved
+from brrp_cli.methods.timing import timed
 from brrp_cli.prior.objects import PriorObject
 from brrp_cli.prior.store import Prior
 from brrp_cli.registration.scan import ObservedCloud, observed_cloud, register
@@ -38,10 +35,10 @@ def reconstruct_object(
     """
     seconds: dict[str, float] = {}
     object_id = observation.object_id
-    with _timed(seconds, "retrieval"):
+    with timed(seconds, "retrieval"):
         probabilities = retriever.probabilities(frame, object_id)
         chosen = top_k(probabilities, prior.names, config.k)
-    with _timed(seconds, "registration"):
+    with timed(seconds, "registration"):
         observed = observed_cloud(observation.points, config.features)
         placed = [
             _place(prior.load(name), probability, observed, config, child_seed(seed, object_id))
@@ -52,7 +49,7 @@ def reconstruct_object(
         for stored, found in placed
         if found.T_cam_object is not None
     ]
-    with _timed(seconds, "inference"):
+    with timed(seconds, "inference"):
         posterior = infer_posterior(
             LabelledPoints(observation.samples, observation.labels),
             [samples for samples, _ in components],
@@ -98,10 +95,3 @@ def _prior_samples(stored: PriorObject, found: Retrieved) -> LabelledPoints:
     assert found.T_cam_object is not None
     points = transform_points(found.T_cam_object, stored.samples.astype(np.float64))
     return LabelledPoints(points, stored.labels)
-
-
-@contextmanager
-def _timed(seconds: dict[str, float], stage: str) -> Iterator[None]:
-    start = time.perf_counter()
-    yield
-    seconds[stage] = time.perf_counter() - start

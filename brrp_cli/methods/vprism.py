@@ -49,6 +49,10 @@ class VPrismPosterior:
         nodes = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
         return self.probability(nodes.reshape(-1, 3)).reshape(nodes.shape[:3])
 
+    def surface_uncertainty(self, vertices: NDArray[np.floating]) -> NDArray[np.float32]:
+        """`uncertainty` (n,) at vertices (n, 3)."""
+        return self.uncertainty(vertices)
+
     def uncertainty(self, points: NDArray[np.floating]) -> NDArray[np.float32]:
         """Variance (n,) of this object's logit against that of free space."""
         _, variance = self.scene.logits(points, [FREE, self.label])

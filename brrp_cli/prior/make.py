@@ -10,6 +10,7 @@ import numpy as np
 from brrp_cli.errors import BrrpError, MeshError
 from brrp_cli.prior.appearance import describe_appearance
 from brrp_cli.prior.clouds import feature_clouds, spread
+from brrp_cli.prior.distance_field import distance_field
 from brrp_cli.prior.find import MeshSource
 from brrp_cli.prior.meshes import load_mesh
 from brrp_cli.prior.objects import PriorObject
@@ -100,6 +101,7 @@ def _from_mesh(  # type: ignore[no-untyped-def]
             "made_with": {library: library_version(library) for library in LIBRARIES},
         },
         appearance=appearance,
+        distances=distance_field(mesh, parameters.distances),
     )
 
 

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brrp_cli.appearance.descriptor import Appearance
+from brrp_cli.prior.distance_field import DistanceField
 
 
 @dataclass(frozen=True)
@@ -50,6 +51,7 @@ class PriorObject:
     poses : resting poses, most probable first
     record : how it was made (repair, sample mix, original size); plain JSON
     appearance : what it looks like; None in a prior of an older brrp
+    distances : signed distances to its surface, normalised; None in a prior of an older brrp
     """
 
     name: str
@@ -64,3 +66,4 @@ class PriorObject:
     poses: list[RestingPose]
     record: dict[str, Any]
     appearance: Appearance | None = None
+    distances: DistanceField | None = None

@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 
 from brrp_cli.appearance.descriptor import Appearance
 from brrp_cli.geometry import normalise
+from brrp_cli.prior.distance_field import DistanceField
 from brrp_cli.prior.objects import FeatureCloud, PriorObject, RestingPose
-from brrp_cli.prior.shard import APPEARANCE, ARRAYS, StoredObject
+from brrp_cli.prior.shard import APPEARANCE, ARRAYS, DISTANCES, StoredObject
 
 
 def pack(item: PriorObject, input_sha256: str) -> StoredObject:
@@ -33,6 +34,12 @@ def pack(item: PriorObject, input_sha256: str) -> StoredObject:
     }
     if item.appearance is not None:
         arrays |= {f"{APPEARANCE}/{key}": value for key, value in vars(item.appearance).items()}
+    if item.distances is not None:
+        arrays |= {
+            f"{DISTANCES}/lower": item.distances.lower,
+            f"{DISTANCES}/spacing": np.array([item.distances.spacing]),
+            f"{DISTANCES}/values": item.distances.values,
+        }
     typed = {key: arrays[key].astype(ARRAYS[key][0]) for key in ARRAYS if key in arrays}
     return StoredObject(item.name, input_sha256, typed, item.record)
 
@@ -67,6 +74,17 @@ def unpack(stored: StoredObject, description: str) -> PriorObject:
         ],
         record=stored.record,
         appearance=unpack_appearance(stored.arrays),
+        distances=_unpack_distances(stored.arrays),
+    )
+
+
+def _unpack_distances(arrays: dict[str, NDArray[Any]]) -> DistanceField | None:
+    if f"{DISTANCES}/values" not in arrays:
+        return None
+    return DistanceField(
+        lower=arrays[f"{DISTANCES}/lower"],
+        spacing=float(arrays[f"{DISTANCES}/spacing"][0]),
+        values=arrays[f"{DISTANCES}/values"].astype(np.float32),
     )
 
 

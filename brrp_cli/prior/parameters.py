@@ -45,6 +45,15 @@ class AppearanceConfig:
 
 
 @dataclass(frozen=True)
+class FieldConfig:
+    """The lattice of signed distances: its nodes, and how far it reaches beyond the bounding box,
+    normalised."""
+
+    nodes: int = 60_000
+    margin: float = 0.1
+
+
+@dataclass(frozen=True)
 class BuildParameters:
     """All of it. `units`: what one unit of the mesh files is."""
 
@@ -57,6 +66,7 @@ class BuildParameters:
     features: FeatureConfig = field(default_factory=FeatureConfig)
     poses: PoseConfig = field(default_factory=PoseConfig)
     appearance: AppearanceConfig = field(default_factory=AppearanceConfig)
+    distances: FieldConfig = field(default_factory=FieldConfig)
 
     def as_dict(self) -> dict[str, Any]:
         """As JSON gives it back: tuples are lists."""

@@ -17,8 +17,11 @@
         appearance/colour   (v, COLOUR_BINS) u1  square roots of histograms, 255 = 1; 0: no colours
         appearance/pairs    (v, PAIR_BINS)   u1  likewise
         appearance/sizes    (r, 3)  f4  metres: height, footprint in each resting pose
+        distances/lower     (3,)    f8  normalised: the first node of a lattice of signed distances
+        distances/spacing   (1,)    f8
+        distances/values    (a, b, c) f2  negative inside
 
-Schema 1 had no appearance; its shards are still read.
+Schema 1 had neither appearance nor distances; its shards are still read.
 
 Every data set is chunked with fletcher32, shuffle and gzip. `content_sha256` covers the arrays and
 the record, so that an object can be taken over from a shard that no manifest vouches for.
@@ -49,9 +52,11 @@ if TYPE_CHECKING:
 SCHEMA = 2
 KIND = "brrp-prior-shard"
 MAX_ROWS = 10_000_000
+MAX_VALUES = 33 * MAX_ROWS
 GZIP_LEVEL = 4
 
 APPEARANCE = "appearance"
+DISTANCES = "distances"
 
 # data set -> (dtype, shape; a letter is a length, the same wherever it stands, "s+1" one more)
 ARRAYS: dict[str, tuple[str, tuple[int | str, ...]]] = {
@@ -70,6 +75,9 @@ ARRAYS: dict[str, tuple[str, tuple[int | str, ...]]] = {
     f"{APPEARANCE}/colour": ("|u1", ("v", COLOUR_BINS)),
     f"{APPEARANCE}/pairs": ("|u1", ("v", PAIR_BINS)),
     f"{APPEARANCE}/sizes": ("<f4", ("r", 3)),
+    f"{DISTANCES}/lower": ("<f8", (3,)),
+    f"{DISTANCES}/spacing": ("<f8", (1,)),
+    f"{DISTANCES}/values": ("<f2", ("a", "b", "c")),
 }
 
 
@@ -164,8 +172,8 @@ def read_stored(file: h5py.File, name: str) -> StoredObject:
     group = _hard(file["objects"], name, where)
     arrays: dict[str, NDArray[Any]] = {}
     lengths: dict[str, int] = {}
-    # Schema 1 has no appearance. Where one was taken out later, the checksum tells.
-    absent = f"{APPEARANCE}/" if APPEARANCE not in group else ()
+    # Schema 1 has neither. Where one was taken out later, the checksum tells.
+    absent = tuple(f"{name}/" for name in (APPEARANCE, DISTANCES) if name not in group)
     for key, (dtype, shape) in ARRAYS.items():
         if not key.startswith(absent):
             arrays[key] = _read_array(group, key, dtype, shape, lengths, where)
@@ -173,6 +181,10 @@ def read_stored(file: h5py.File, name: str) -> StoredObject:
     if _content_sha256(arrays, record) != group.attrs["content_sha256"]:
         raise damaged(where, "data that do not have the object's checksum")
     starts = arrays["cloud_starts"]
+    if DISTANCES in group and not (
+        arrays[f"{DISTANCES}/spacing"][0] > 0 and min(arrays[f"{DISTANCES}/values"].shape) > 1
+    ):
+        raise damaged(where, "distances without a lattice")
     if starts[0] != 0 or starts[-1] != lengths["p"] or (np.diff(starts) < 0).any():
         raise damaged(where, "clouds that overlap")
     return StoredObject(name, str(group.attrs["input_sha256"]), arrays, record)
@@ -214,7 +226,7 @@ def _read_array(
     found = f"{key}: {data.dtype.str} {data.shape}"
     fits = data.dtype == np.dtype(dtype) and len(data.shape) == len(shape)
     fits = fits and not data.is_virtual and data.external is None and data.fletcher32
-    if not fits or max(data.shape) > MAX_ROWS:
+    if not fits or max(data.shape) > MAX_ROWS or data.size > MAX_VALUES:
         raise damaged(where, f"{found}, expected {dtype} {shape} with checksums")
     for length, symbol in zip(data.shape, shape, strict=True):
         if isinstance(symbol, str):

@@ -157,6 +157,7 @@ def _object_record(item: ObjectReconstruction, T_target_cam: NDArray[np.float64]
         "mesh": None if item.surface is None else mesh_name(item.object_id),
         **({} if item.surface is None else _surface_record(item.surface, T_target_cam)),
         "not_in_prior": item.unknown_probability,
+        "weight_not_in_prior": item.unknown_weight,
         "retrieved": [_retrieved_record(r, T_target_cam) for r in item.retrieved],
         "seconds": _rounded(item.seconds),
     }
@@ -183,6 +184,8 @@ def _retrieved_record(found: Retrieved, T_target_cam: NDArray[np.float64]) -> di
         "scale": found.scale,
         "inliers": found.inliers,
         "fitness": found.fitness,
+        "evidence": found.evidence,
+        "weight": found.weight,
         "T_frame_object": None if placed is None else (T_target_cam @ placed).tolist(),
     }
 

@@ -1,9 +1,9 @@
 import numpy as np
 import torch
 
-from brrp_cli.inference.hinge import HingeGrid, axis_factors, features, lattice_logits
+from brrp_cli.inference.hinge import HingeGrid, axis_factors, cubic_grid, features, lattice_logits
 
-GRID = HingeGrid(per_axis=5, half_width=0.1, floor=1e-7)
+GRID = cubic_grid(per_axis=5, half_width=0.1, floor=1e-7)
 
 
 def hinge_points():
@@ -28,13 +28,13 @@ def test_far_from_every_hinge_point_only_the_bias_is_left():
 
 
 def test_spacing_is_that_of_the_papers_grid():
-    assert HingeGrid(12, 0.15, 1e-7).spacing == 0.3 / 11
-    assert HingeGrid(12, 0.15, 1e-7).dimension == 1729
+    assert cubic_grid(12, 0.15, 1e-7).spacing == 0.3 / 11
+    assert cubic_grid(12, 0.15, 1e-7).dimension == 1729
 
 
 def test_a_kernel_is_one_on_its_own_hinge_point():
     axis = torch.linspace(-0.1, 0.1, 5, dtype=torch.float64)
-    np.testing.assert_allclose(torch.diagonal(axis_factors(axis, GRID)), np.ones(5))
+    np.testing.assert_allclose(torch.diagonal(axis_factors(axis, GRID, 0)), np.ones(5))
 
 
 def test_lattice_logits_equal_the_features_point_by_point_with_axes_in_order():
@@ -48,3 +48,13 @@ def test_lattice_logits_equal_the_features_point_by_point_with_axes_in_order():
     torch.testing.assert_close(
         lattice_logits(weights, (x, y, z), GRID), expected, rtol=0, atol=float(bound)
     )
+
+
+def test_a_box_of_hinge_points_keeps_its_axes_apart():
+    grid = HingeGrid((-0.1, 0.0, 0.2), (2, 3, 4), 0.05, 1e-7)
+    assert grid.dimension == 25
+    i, j, k = 1, 2, 3
+    hinge = torch.tensor([[-0.1 + 0.05 * i, 0.05 * j, 0.2 + 0.05 * k]], dtype=torch.float64)
+    found = features(hinge, grid)[0, 1:]
+    assert int(found.argmax()) == (i * 3 + j) * 4 + k
+    np.testing.assert_allclose(float(found.max()), 1)

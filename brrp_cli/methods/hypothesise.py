@@ -1,0 +1,202 @@
+"""BRRP by hypotheses: retrieve, place in many ways, verify, weigh, infer (the default preset)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brrp_cli.config import Config, HypothesesConfig, WeighConfig
+from brrp_cli.errors import PriorError
+from brrp_cli.frames.frame import Frame
+from brrp_cli.frames.observe import ObjectObservation
+from brrp_cli.frames.plane import Plane
+from brrp_cli.geometry import transform_points
+from brrp_cli.inference.hypothesis_posterior import HypothesisPosterior
+from brrp_cli.inference.infer import LabelledPoints
+from brrp_cli.inference.infer_hypotheses import Problem, infer_correction
+from brrp_cli.inference.mean import (
+    MeanLattice,
+    carved,
+    hull_logits,
+    lattice_over,
+    shape_logits,
+)
+from brrp_cli.inference.visible_hull import hull_distance, hull_facets, hull_points
+from brrp_cli.methods.base import OK, ObjectReconstruction, Retrieved
+from brrp_cli.methods.timing import timed
+from brrp_cli.prior.store import Prior
+from brrp_cli.registration.model import search_model
+from brrp_cli.registration.scan import observed_cloud
+from brrp_cli.registration.search import Hypothesis, search
+from brrp_cli.registration.testimony import Testimony
+from brrp_cli.retrieval.base import Retriever, top_k, unknown
+from brrp_cli.seeds import child_rng, child_seed
+
+Array = NDArray[np.float64]
+
+
+def reconstruct_by_hypotheses(
+    frame: Frame,
+    plane: Plane | None,
+    observation: ObjectObservation,
+    prior: Prior,
+    retriever: Retriever,
+    config: Config,
+    *,
+    seed: int,
+    device: str,
+) -> ObjectReconstruction:
+    """Posterior of one object from hypotheses about the k retrieved objects and from the one that
+    it is none of them, each corrected by what was observed."""
+    hypotheses = config.hypotheses
+    assert hypotheses is not None
+    seconds: dict[str, float] = {}
+    object_id = observation.object_id
+    with timed(seconds, "retrieval"):
+        probabilities = retriever.probabilities(frame, object_id)
+        chosen = top_k(probabilities, prior.names, config.k)
+        missing = unknown(probabilities)
+    with timed(seconds, "registration"):
+        testimony = Testimony(_shuffled(observation.points, seed, object_id), frame, plane)
+        observed = observed_cloud(observation.points, config.features)
+        found = [
+            search(
+                search_model(prior.load(name)),
+                observed,
+                testimony,
+                config.features,
+                hypotheses.search,
+                child_seed(seed, object_id),
+            )
+            for name, _ in chosen
+        ]
+    with timed(seconds, "inference"):
+        placed = [each for group in found for each in group]
+        shares = [p for (_, p), group in zip(chosen, found, strict=True) for _ in group]
+        weights = weigh(shares, [each.evidence for each in placed], missing, hypotheses.weigh)
+        posterior = _infer(
+            observation, frame, plane, placed, weights, hypotheses, seed=seed, device=device
+        )
+    ends = np.cumsum([0, *(len(group) for group in found)])
+    return ObjectReconstruction(
+        object_id=object_id,
+        status=OK,
+        n_points=len(observation.points),
+        center=observation.center,
+        observed=observation.points,
+        retrieved=[
+            _retrieved(name, probability, group, float(weights[a:b].sum()))
+            for (name, probability), group, a, b in zip(
+                chosen, found, ends[:-1], ends[1:], strict=True
+            )
+        ],
+        unknown_probability=missing,
+        unknown_weight=float(weights[-1]),
+        posterior=posterior,
+        seconds=seconds,
+    )
+
+
+def weigh(
+    shares: Sequence[float], evidence: Sequence[float], missing: float, config: WeighConfig
+) -> Array:
+    """Weights (C + 1,), sum 1, of C hypotheses and, last, of the one that it is something else.
+
+    shares : P(c|R) of each hypothesis's object; missing : P(not in the prior | R).
+    """
+    none = float(np.clip(missing, config.least_unknown, config.most_unknown))
+    known = np.asarray(shares, dtype=np.float64)
+    # Ratios among the stored objects are the retriever's, how likely they are as a whole is not:
+    # evidence that stands above all doubt outweighs a retriever that was wrong.
+    total = known.sum() or 1.0
+    probability = np.append(known / total * (1 - none), none)
+    scores = np.append(np.asarray(evidence, dtype=np.float64), config.unknown_evidence)
+    log = np.log(np.maximum(probability, config.least_share)) + config.sharpness * scores
+    weights = np.exp(log - log.max())
+    return np.asarray(weights / weights.sum())
+
+
+def _infer(
+    observation: ObjectObservation,
+    frame: Frame,
+    plane: Plane | None,
+    placed: list[Hypothesis],
+    weights: Array,
+    config: HypothesesConfig,
+    *,
+    seed: int,
+    device: str,
+) -> HypothesisPosterior:
+    """Only hypotheses that a particle may get cost a mean function."""
+    kept = np.flatnonzero(weights > 0.5 / config.map.particles / len(weights))
+    hull = hull_points(observation.points, plane)
+    shapes = [_surface(placed[i]) for i in kept if i < len(placed)]
+    extent = np.concatenate([*shapes, hull if len(placed) in kept else observation.points])
+    box = np.stack([extent.min(axis=0) - config.map.margin, extent.max(axis=0) + config.map.margin])
+    lower, spacing, nodes = lattice_over(box, config.mean)
+    points = nodes.reshape(-1, 3)
+    logits = [
+        hull_logits(hull_distance(points, hull_facets(hull)), config.mean)
+        if i == len(placed)
+        else shape_logits(_distance(placed[i], points), placed[i].evidence, config.mean)
+        for i in kept
+    ]
+    values = [
+        carved(each, points, frame, plane, config.mean).reshape(nodes.shape[:3]) for each in logits
+    ]
+    mean = MeanLattice(
+        lower, spacing, np.stack(values).astype(np.float16), outside=-config.mean.limit
+    )
+    return infer_correction(
+        Problem(
+            LabelledPoints(observation.samples, observation.labels),
+            mean,
+            weights[kept] / weights[kept].sum(),
+            box,
+        ),
+        config.map,
+        seed=child_seed(seed, observation.object_id),
+        device=device,
+    )
+
+
+def _surface(hypothesis: Hypothesis) -> Array:
+    return np.asarray(transform_points(hypothesis.T_cam_model, hypothesis.model.surface))
+
+
+def _distance(hypothesis: Hypothesis, points: Array) -> Array:
+    """Signed distance (n,), metres, of points (n, 3), camera frame, to the placed shape."""
+    stored = hypothesis.model.stored
+    if stored.distances is None:
+        raise PriorError(
+            "The prior holds no distances",
+            where=stored.name,
+            expected="a prior of this version of brrp",
+            fix="run brrp build-prior --overwrite on the meshes, or use --preset paper",
+        )
+    T_object_cam = np.linalg.inv(hypothesis.T_cam_object)
+    unit = stored.half_extent * hypothesis.scale
+    return stored.distances.signed_distance(transform_points(T_object_cam, points)) * unit
+
+
+def _shuffled(points: NDArray[np.float32], seed: int, object_id: int) -> Array:
+    """In random order: every leading part covers what was seen."""
+    rng = child_rng(seed, "testimony", object_id)
+    return rng.permutation(points).astype(np.float64)
+
+
+def _retrieved(name: str, probability: float, group: list[Hypothesis], weight: float) -> Retrieved:
+    """The object with its best placement, and the weight of all of them."""
+    if not group:
+        return Retrieved(name, probability, weight=weight)
+    best = group[0]
+    return Retrieved(
+        name,
+        probability,
+        best.T_cam_object,
+        best.scale,
+        evidence=best.evidence,
+        weight=weight,
+    )

@@ -1,0 +1,54 @@
+"""A stored object in its true size, ready to be tried on."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from brrp_cli.geometry import similarity
+from brrp_cli.prior.objects import PriorObject
+
+# Surface points that the coarse search and ICP use. The stored points come in random order, so that
+# every leading part covers the surface.
+COARSE, FINE = 300, 2000
+
+
+@dataclass(frozen=True)
+class Model:
+    """Metres, about the middle of the object's box, axes of its mesh.
+
+    surface, normals : (n, 3), unit outward normals
+    """
+
+    stored: PriorObject
+    surface: NDArray[np.float64]
+    normals: NDArray[np.float64]
+
+    @cached_property
+    def tree(self) -> cKDTree:
+        """For distances to the whole surface."""
+        return cKDTree(self.surface)
+
+    @property
+    def T_model_object(self) -> NDArray[np.float64]:
+        """(4, 4), from the stored object's normalised coordinates."""
+        return similarity(scale=self.stored.half_extent)
+
+    @property
+    def resting(self) -> list[NDArray[np.float64]]:
+        """T_plane_model (4, 4) of each resting pose, most probable first."""
+        T_object_model = similarity(translation=self.stored.center)
+        return [pose.T_plane_object @ T_object_model for pose in self.stored.poses]
+
+
+def search_model(stored: PriorObject) -> Model:
+    """The model of a stored object."""
+    return Model(
+        stored,
+        stored.surface.astype(np.float64) * stored.half_extent,
+        stored.surface_normals.astype(np.float64),
+    )

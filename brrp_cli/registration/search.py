@@ -1,0 +1,129 @@
+"""Many hypotheses of where a stored object is: begin widely, refine the best, verify all.
+
+The paper's scan (scan.py) takes the one placement with most inlier pairs, at ten fixed sizes. Here
+a stored object keeps its own size, or one near it; starts are resting poses turned about the
+table's normal and feature matchings; what decides is what the whole image says (testimony.py).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brrp_cli.config import FeatureConfig, SearchConfig
+from brrp_cli.geometry import similarity
+from brrp_cli.registration.model import COARSE, FINE, Model
+from brrp_cli.registration.refine import refine
+from brrp_cli.registration.scan import ObservedCloud
+from brrp_cli.registration.starts import matched_starts, resting_starts
+from brrp_cli.registration.testimony import Testimony
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Hypothesis:
+    """A stored object placed in the scene.
+
+    T_cam_model : (4, 4) similarity from the model (metres, true size); scale : of it, 1 is the true
+    size; evidence : what the frame says of it, 1 at best, less what its scale costs
+    """
+
+    model: Model
+    T_cam_model: Array
+    scale: float
+    evidence: float
+
+    @property
+    def T_cam_object(self) -> Array:
+        """(4, 4) similarity from the stored object's normalised coordinates."""
+        return np.asarray(self.T_cam_model @ self.model.T_model_object)
+
+
+def search(
+    model: Model,
+    observed: ObservedCloud,
+    testimony: Testimony,
+    features: FeatureConfig,
+    config: SearchConfig,
+    seed: int,
+) -> list[Hypothesis]:
+    """The best placements of one model, best first, `config.kept` at most."""
+    starts = matched_starts(model, observed, features, config.matching, config.matchings, seed)
+    if testimony.plane is not None:
+        starts += resting_starts(model, testimony.points, testimony.plane, config.turns)
+    T = _best(np.stack(starts), model, testimony, config, config.coarse)
+    T = _refined(T, model, testimony, config.coarse_distance, config.coarse_points)
+    T = _best(T, model, testimony, config, config.fine)
+    T = _refined(T, model, testimony, config.fine_distance, config.fine_points)
+    found = _judged(T, 1.0, model, testimony, config)
+    parents = [each.T_cam_model for each in found[: config.rescaled]]
+    for scale in config.scales:
+        resized = np.stack([_resize(parent, scale, testimony) for parent in parents])
+        resized = _refined(resized, model, testimony, config.scale_distance, config.coarse_points)
+        found += _judged(resized, scale, model, testimony, config)
+    return sorted(found, key=lambda each: -each.evidence)[: config.kept]
+
+
+def _best(
+    T_cam_model: Array, model: Model, testimony: Testimony, config: SearchConfig, count: int
+) -> Array:
+    score = testimony.score(
+        T_cam_model,
+        model,
+        config.evidence,
+        model_points=COARSE,
+        seen_points=config.seen_points,
+    )
+    return np.asarray(T_cam_model[np.argsort(-score, kind="stable")[:count]])
+
+
+def _judged(
+    T_cam_model: Array, scale: float, model: Model, testimony: Testimony, config: SearchConfig
+) -> list[Hypothesis]:
+    score = testimony.score(
+        T_cam_model,
+        model,
+        config.evidence,
+        model_points=config.fine_points,
+        seen_points=config.fine_points,
+    )
+    score = score - config.scale_cost * np.log(scale) ** 2
+    found = [Hypothesis(model, T, scale, float(s)) for T, s in zip(T_cam_model, score, strict=True)]
+    return sorted(found, key=lambda each: -each.evidence)
+
+
+def _refined(
+    T_cam_model: Array, model: Model, testimony: Testimony, distance: float, points: int
+) -> Array:
+    """Each placement after ICP that keeps its scale; pairs further apart than `distance` metres do
+    not pull."""
+    seen = testimony.points[:points]
+    # ICP turns about the origin: at the object it needs no long way.
+    center = seen.mean(axis=0)
+    refined = []
+    for T in T_cam_model:
+        scale = float(np.cbrt(np.linalg.det(T[:3, :3])))
+        T_center_model = T.copy()
+        T_center_model[:3, :3] /= scale
+        T_center_model[:3, 3] -= center
+        found = refine(
+            T_center_model,
+            seen - center,
+            model.surface[:FINE] * scale,
+            model.normals[:FINE],
+            distance,
+        )
+        refined.append(similarity(scale, found[:3, :3], found[:3, 3] + center))
+    return np.stack(refined)
+
+
+def _resize(T_cam_model: Array, scale: float, testimony: Testimony) -> Array:
+    """Grown by `scale` about the middle of what is seen."""
+    center = testimony.points.mean(axis=0)
+    T = T_cam_model.copy()
+    T[:3, :3] *= scale
+    T[:3, 3] = center + scale * (T[:3, 3] - center)
+    return T

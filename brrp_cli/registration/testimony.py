@@ -1,0 +1,101 @@
+"""What a whole frame says for and against many placements of a model at once."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brrp_cli.config import EvidenceConfig
+from brrp_cli.frames.frame import Frame
+from brrp_cli.frames.plane import Plane
+from brrp_cli.geometry import project
+from brrp_cli.registration.model import Model
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Testimony:
+    """One seen object: its points (n, 3), metres, camera frame, in random order, the frame that
+    shows it, and the plane it stands on, where there is one."""
+
+    points: Array
+    frame: Frame
+    plane: Plane | None
+
+    def score(
+        self,
+        T_cam_model: Array,
+        model: Model,
+        config: EvidenceConfig,
+        *,
+        model_points: int,
+        seen_points: int,
+    ) -> Array:
+        """Evidence (B,) of placements T_cam_model (B, 4, 4), similarities; 1 at best.
+
+        For: observed points on the model's surface. Against: observed points far from it, model
+        surface in space that the camera saw to be free, model surface below the plane. Each is a
+        share, so that seen and hidden sides, large and small objects are judged alike.
+        """
+        surface = model.surface[:model_points]
+        return (
+            self._explained(T_cam_model, model, self.points[:seen_points], config)
+            - config.contradiction * self._contradicted(T_cam_model, surface, config)
+            - config.contradiction * self._below(T_cam_model, surface, config)
+        )
+
+    def _explained(
+        self, T_cam_model: Array, model: Model, seen: Array, config: EvidenceConfig
+    ) -> Array:
+        """Mean (B,) of a Gaussian of the observed points' distances, less a share of how far the
+        others are, so that a search that explains nothing yet still has a slope."""
+        linear = T_cam_model[:, :3, :3]
+        scale = np.cbrt(np.linalg.det(linear))
+        in_model = np.einsum(
+            "bij,bnj->bni", np.linalg.inv(linear), seen - T_cam_model[:, None, :3, 3]
+        )
+        reach = 1.5 * config.far
+        distance, _ = model.tree.query(in_model.reshape(-1, 3), distance_upper_bound=reach)
+        distance = np.minimum(distance.reshape(in_model.shape[:2]), reach) * scale[:, None]
+        near = np.exp(-0.5 * (distance / config.near) ** 2).mean(axis=1)
+        far = (np.minimum(distance, config.far) / config.far).mean(axis=1)
+        return np.asarray(near - config.distance * far)
+
+    def _contradicted(self, T_cam_model: Array, surface: Array, config: EvidenceConfig) -> Array:
+        """Share (B,) of the surface that stands in front of the measured depth, soft in depth."""
+        points = _placed(T_cam_model, surface)
+        gap = depth_behind(points.reshape(-1, 3), self.frame).reshape(points.shape[:2])
+        return np.asarray(_ramp(np.nan_to_num(gap), config).mean(axis=1))
+
+    def _below(self, T_cam_model: Array, surface: Array, config: EvidenceConfig) -> Array:
+        if self.plane is None:
+            return np.zeros(len(T_cam_model))
+        depth = -self.plane.signed_distance(_placed(T_cam_model, surface))
+        return np.asarray(_ramp(depth, config).mean(axis=1))
+
+
+def depth_behind(points: NDArray[np.floating], frame: Frame) -> Array:
+    """How far behind each of `points` (n, 3), camera frame, its pixel's measured depth lies,
+    metres: positive in free space, negative where the point is hidden. NaN where the point's pixel
+    has no depth, lies outside of the image or behind the camera."""
+    gap = np.full(len(points), np.nan)
+    ahead = np.flatnonzero(points[:, 2] > 0)
+    pixels = np.rint(project(points[ahead], frame.K)).astype(np.int64)
+    height, width = frame.shape
+    inside = (pixels >= 0).all(axis=1) & (pixels[:, 0] < width) & (pixels[:, 1] < height)
+    columns, rows = pixels[inside].T
+    which = ahead[inside]
+    gap[which] = frame.points[rows, columns, 2] - points[which, 2]
+    return gap
+
+
+def _ramp(depth: Array, config: EvidenceConfig) -> Array:
+    return np.clip((depth - config.tolerance) / config.slope, 0, 1)
+
+
+def _placed(T_cam_model: Array, surface: Array) -> Array:
+    rotated = np.einsum("bij,mj->bmi", T_cam_model[:, :3, :3], surface)
+    return np.asarray(rotated + T_cam_model[:, None, :3, 3])
