@@ -153,9 +153,10 @@ class MeanConfig:
     """Mean functions of hypotheses, logits on a lattice of about `nodes` nodes.
 
     A placed shape is -(signed distance - growth) / width, limited to +-limit; evidence under `sure`
-    widens it by `doubt` for each unit. The hull of what was seen is -(distance) / hull_width,
-    between -limit and hull_limit. Space that lies more than `carve_depth` in front of the measured
-    depth, or `carve_plane` below the plane, is empty.
+    widens it by `doubt` for each unit. The shape of what was seen is -distance / visible_width,
+    between -limit and visible_limit. Space is empty that lies more than `carve_depth` in front of
+    the measured depth, or `carve_plane` below the plane, or less than `carve_behind` behind what
+    is no object's and more than `carve_pixels` from the mask.
     """
 
     nodes: int = 100_000
@@ -164,10 +165,27 @@ class MeanConfig:
     sure: float = 0.85
     doubt: float = 0.02
     limit: float = 5.0
-    hull_width: float = 0.005
-    hull_limit: float = 1.0
+    visible_width: float = 0.005
+    visible_limit: float = 1.0
     carve_depth: float = 0.006
     carve_plane: float = 0.004
+    carve_behind: float = 0.01
+    carve_pixels: int = 2
+
+
+@dataclass(frozen=True)
+class VisibleShapeConfig:
+    """The shape of an object that no stored one explains.
+
+    cell : of grids in which observed points are merged; closing : gaps of fewer cells are closed
+    shrink : metres by which the hull is drawn in for each metre from an observed point; growth :
+    metres by which it is grown as a whole
+    """
+
+    cell: float = 0.004
+    closing: int = 7
+    shrink: float = 0.15
+    growth: float = 0.003
 
 
 @dataclass(frozen=True)
@@ -200,6 +218,7 @@ class HypothesesConfig:
     search: SearchConfig = field(default_factory=SearchConfig)
     weigh: WeighConfig = field(default_factory=WeighConfig)
     mean: MeanConfig = field(default_factory=MeanConfig)
+    visible: VisibleShapeConfig = field(default_factory=VisibleShapeConfig)
     map: FittedMapConfig = field(default_factory=FittedMapConfig)
 
 

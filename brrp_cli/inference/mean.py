@@ -12,13 +12,13 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import map_coordinates
+from scipy.ndimage import binary_dilation, map_coordinates
 
 from brrp_cli.config import MeanConfig
-from brrp_cli.frames.frame import Frame
+from brrp_cli.frames.frame import BACKGROUND, Frame
 from brrp_cli.frames.plane import Plane
 from brrp_cli.methods.base import Axes
-from brrp_cli.registration.testimony import depth_behind
+from brrp_cli.registration.testimony import at_pixels, depth_behind
 
 Array = NDArray[np.float64]
 # Signed distance (n,), metres, negative inside, of points (n, 3), metres, camera frame.
@@ -80,17 +80,24 @@ def shape_logits(distance: Array, evidence: float, config: MeanConfig) -> Array:
     return np.asarray(logits)
 
 
-def hull_logits(distance: Array, config: MeanConfig) -> Array:
-    """Logits inside and around the hull of what was seen: less sure inside than outside."""
-    return np.clip(-distance / config.hull_width, -config.limit, config.hull_limit)
+def visible_logits(distance: Array, config: MeanConfig) -> Array:
+    """Logits of the shape of what was seen: less sure inside than outside."""
+    return np.clip(-distance / config.visible_width, -config.limit, config.visible_limit)
 
 
-def carved(
-    logits: Array, points: Array, frame: Frame, plane: Plane | None, config: MeanConfig
-) -> Array:
-    """`logits` (n,) at points (n, 3), metres, camera frame, with what cannot be occupied emptied:
-    space in front of the measured depth, and space below the plane."""
-    free = np.nan_to_num(depth_behind(points, frame), nan=-np.inf) > config.carve_depth
+def empty_space(
+    points: Array, frame: Frame, object_id: int, plane: Plane | None, config: MeanConfig
+) -> NDArray[np.bool_]:
+    """Which of `points` (n, 3), metres, camera frame, cannot be in the object.
+
+    Space in front of the measured depth; space below the plane; and, since the object would hide
+    it, space close to a surface that is no object's.
+    """
+    behind = depth_behind(points, frame)
+    empty = np.nan_to_num(behind, nan=-np.inf) > config.carve_depth
     if plane is not None:
-        free |= plane.signed_distance(points) < -config.carve_plane
-    return np.where(free, np.minimum(logits, -config.limit), logits)
+        empty |= plane.signed_distance(points) < -config.carve_plane
+    own = binary_dilation(frame.segmap == object_id, iterations=config.carve_pixels)
+    background = np.where((frame.segmap == BACKGROUND) & ~own, 1, 0)
+    close = np.nan_to_num(behind, nan=-np.inf) > -config.carve_behind
+    return empty | (close & (at_pixels(points, background, frame) == 1))

@@ -18,12 +18,12 @@ from brrp_cli.inference.infer import LabelledPoints
 from brrp_cli.inference.infer_hypotheses import Problem, infer_correction
 from brrp_cli.inference.mean import (
     MeanLattice,
-    carved,
-    hull_logits,
+    empty_space,
     lattice_over,
     shape_logits,
+    visible_logits,
 )
-from brrp_cli.inference.visible_hull import hull_distance, hull_facets, hull_points
+from brrp_cli.inference.visible_shape import visible_shape
 from brrp_cli.methods.base import OK, ObjectReconstruction, Retrieved
 from brrp_cli.methods.timing import timed
 from brrp_cli.prior.store import Prior
@@ -131,24 +131,27 @@ def _infer(
 ) -> HypothesisPosterior:
     """Only hypotheses that a particle may get cost a mean function."""
     kept = np.flatnonzero(weights > 0.5 / config.map.particles / len(weights))
-    hull = hull_points(observation.points, plane)
-    shapes = [_surface(placed[i]) for i in kept if i < len(placed)]
-    extent = np.concatenate([*shapes, hull if len(placed) in kept else observation.points])
-    box = np.stack([extent.min(axis=0) - config.map.margin, extent.max(axis=0) + config.map.margin])
+    visible = visible_shape(observation.points, plane, config.visible)
+    extent = np.concatenate(
+        [visible.extent if i == len(placed) else _surface(placed[i]) for i in kept]
+        + [observation.points]
+    )
+    margin = config.map.margin
+    box = np.stack([extent.min(axis=0) - margin, extent.max(axis=0) + margin])
     lower, spacing, nodes = lattice_over(box, config.mean)
     points = nodes.reshape(-1, 3)
-    logits = [
-        hull_logits(hull_distance(points, hull_facets(hull)), config.mean)
-        if i == len(placed)
-        else shape_logits(_distance(placed[i], points), placed[i].evidence, config.mean)
-        for i in kept
-    ]
-    values = [
-        carved(each, points, frame, plane, config.mean).reshape(nodes.shape[:3]) for each in logits
-    ]
-    mean = MeanLattice(
-        lower, spacing, np.stack(values).astype(np.float16), outside=-config.mean.limit
+    logits = np.stack(
+        [
+            visible_logits(visible.signed_distance(points), config.mean)
+            if i == len(placed)
+            else shape_logits(_distance(placed[i], points), placed[i].evidence, config.mean)
+            for i in kept
+        ]
     )
+    empty = empty_space(points, frame, observation.object_id, plane, config.mean)
+    logits[:, empty] = -config.mean.limit
+    values = logits.reshape(-1, *nodes.shape[:3])
+    mean = MeanLattice(lower, spacing, values.astype(np.float16), outside=-config.mean.limit)
     return infer_correction(
         Problem(
             LabelledPoints(observation.samples, observation.labels),

@@ -81,15 +81,20 @@ def depth_behind(points: NDArray[np.floating], frame: Frame) -> Array:
     """How far behind each of `points` (n, 3), camera frame, its pixel's measured depth lies,
     metres: positive in free space, negative where the point is hidden. NaN where the point's pixel
     has no depth, lies outside of the image or behind the camera."""
-    gap = np.full(len(points), np.nan)
+    return np.asarray(at_pixels(points, frame.points[..., 2], frame) - points[:, 2])
+
+
+def at_pixels(points: NDArray[np.floating], image: NDArray[np.generic], frame: Frame) -> Array:
+    """Values (n,) of an image (H, W) at the pixels of points (n, 3), camera frame; NaN outside of
+    the image and behind the camera."""
+    found = np.full(len(points), np.nan)
     ahead = np.flatnonzero(points[:, 2] > 0)
     pixels = np.rint(project(points[ahead], frame.K)).astype(np.int64)
     height, width = frame.shape
     inside = (pixels >= 0).all(axis=1) & (pixels[:, 0] < width) & (pixels[:, 1] < height)
     columns, rows = pixels[inside].T
-    which = ahead[inside]
-    gap[which] = frame.points[rows, columns, 2] - points[which, 2]
-    return gap
+    found[ahead[inside]] = image[rows, columns]
+    return found
 
 
 def _ramp(depth: Array, config: EvidenceConfig) -> Array:
