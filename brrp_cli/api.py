@@ -97,9 +97,9 @@ def reconstruct(
 ) -> Reconstruction:
     """Reconstruct every object of a segmented frame with BRRP.
 
-    retriever : P(c|R); without one, CLIP if `BRRP_CLIP_DIR` is set and registration fitness
-    otherwise. An object that cannot be reconstructed gets a status; the others still are. The
-    frame is never changed. The same seed gives the same result.
+    retriever : P(c|R); without one, CLIP if `BRRP_CLIP_DIR` is set or CLIP was fetched, and
+    registration fitness otherwise. An object that cannot be reconstructed gets a status; the
+    others still are. The frame is never changed. The same seed gives the same result.
     """
     from brrp_cli.methods.brrp import reconstruct_object
     from brrp_cli.retrieval.choose import choose_retriever

@@ -30,8 +30,8 @@ from brrp_cli.evaluation.variants import Variant, expand, same_results, short_la
 from brrp_cli.files import write_bytes
 from brrp_cli.methods.registry import METHODS
 from brrp_cli.progress import progress
-from brrp_cli.retrieval.choose import clip_folder, need_clip_folder, resolve_name
-from brrp_cli.retrieval.clip_files import find_clip_files
+from brrp_cli.retrieval.choose import resolve_name
+from brrp_cli.retrieval.clip_files import clip_folder, need_clip_folder
 from brrp_cli.version import __version__
 
 
@@ -84,8 +84,7 @@ def evaluate(request: Request, say: Callable[[str], None] = lambda text: None) -
     )
     prior = _prior(request)
     if any(variant.retriever == "clip" for variant in variants):
-        # A missing model is told now, not in every row.
-        find_clip_files(need_clip_folder(request.clip_dir))
+        _prepare_clip(prior, need_clip_folder(request.clip_dir))
     parameters = _parameters(request, scenes, variants, prior)
     workers = request.workers or len(os.sched_getaffinity(0))
     labels = short_labels(variants)
@@ -167,6 +166,16 @@ def _prior(request: Request) -> dict[str, str] | None:
         return None
     path, _ = locate_prior(request.prior)
     return {"path": str(path), "digest": open_prior(path).digest}
+
+
+def _prepare_clip(prior: dict[str, str] | None, folder: Path) -> None:
+    """Embed the descriptions once, so that no worker has to; a missing model is told now, not in
+    every row."""
+    from brrp_cli.prior.store import open_prior
+    from brrp_cli.retrieval.clip import keep_descriptions
+
+    assert prior is not None
+    keep_descriptions(open_prior(prior["path"]), folder)
 
 
 def _parameters(

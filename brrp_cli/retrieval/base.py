@@ -23,7 +23,10 @@ class Retriever(Protocol):
         """Short name, such as `clip`."""
 
     def probabilities(self, frame: Frame, object_id: int) -> NDArray[np.float64]:
-        """P(c|R) (n,) for one object of the frame, in the order of the prior's names, sum 1."""
+        """P(c|R) (n,) for one object of the frame, in the order of the prior's names.
+
+        They may sum to less than 1: what is missing is P(not in the prior).
+        """
 
 
 def softmax(scores: NDArray[np.floating]) -> NDArray[np.float64]:

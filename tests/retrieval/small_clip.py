@@ -1,7 +1,7 @@
 """Small CLIPs of both published interfaces: colours are all that they know of the world.
 
-The text model sums a vector for each of the words red, green and blue; the vision model takes the
-mean pixel. Both map (red, green, blue) to 512 numbers by one matrix with orthonormal rows.
+The text model sums a vector for each of the words red, green, blue, and object, which is white;
+the vision model takes the mean pixel. Both map (red, green, blue) to 512 numbers by one matrix with orthonormal rows.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ from tokenizers import Regex, Tokenizer, models, normalizers, pre_tokenizers
 WORDS = {"photo": 1125, "of": 539, "cat": 2368}
 # Green before red: as a merge of its own, "re" would otherwise split "green".
 COLOURS = {"green": 40002, "red": 40001, "blue": 40003}
+OBJECT = {"object": 40004}
 RGB = {"red": (255, 0, 0), "green": (0, 255, 0), "blue": (0, 0, 255)}
 
 
@@ -31,7 +32,7 @@ def write_tokenizer(path: Path, start: int = 49406, end: int = 49407) -> None:
     vocabulary |= {"<|startoftext|>": start, "<|endoftext|>": end}
     merges: list[tuple[str, str]] = []
     part_id = 45000
-    for word, word_id in {**WORDS, **COLOURS}.items():
+    for word, word_id in {**WORDS, **COLOURS, **OBJECT}.items():
         left = word[0]
         for i, letter in enumerate(word[1:], start=1):
             last = i == len(word) - 1
@@ -85,6 +86,7 @@ def write_model(
         table = np.zeros((49408, 3), dtype=np.float32)
         for column, word in enumerate(RGB):
             table[COLOURS[word], column] = 1
+        table[OBJECT["object"]] = 1
         constants |= {"table": table, "axes": np.array([1])}
         nodes = [
             helper.make_node("Gather", ["table", name], ["words"]),
