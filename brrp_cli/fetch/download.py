@@ -24,7 +24,8 @@ TRIES = 3
 PAUSE = 1.0
 # Seconds for a connection, and for the next bytes of one that is open.
 TIMEOUT = (10, 60)
-_CHUNK = 2**18
+# A cut loses the last chunk at most.
+CHUNK = 2**16
 
 
 class _CutError(Exception):
@@ -96,7 +97,7 @@ def _receive(
         if not goes_on:
             advance(-have)
         with part.open("ab" if goes_on else "wb") as stream:
-            for chunk in answer.iter_content(_CHUNK):
+            for chunk in answer.iter_content(CHUNK):
                 if stream.tell() + len(chunk) > size:
                     part.unlink()
                     raise _other_size(url, size, f"more than {size} bytes")
@@ -143,13 +144,9 @@ def _worth_a_try(error: Exception) -> bool:
 
 
 def _failed(url: str, part: Path, size: int, error: Exception) -> FetchError:
+    requests = import_library("requests")
     have = part.stat().st_size if part.exists() else 0
-    offline = (
-        "check the network and the proxy (HTTPS_PROXY). Without a network: run this command with "
-        "--clip-dir FOLDER on a machine that has one, bring the folder, and name it with "
-        "--clip-dir or BRRP_CLIP_DIR"
-    )
-    if have:
+    if have or not isinstance(error, requests.ConnectionError | requests.Timeout):
         return FetchError(
             "The download was cut",
             where=url,
@@ -157,7 +154,12 @@ def _failed(url: str, part: Path, size: int, error: Exception) -> FetchError:
             fix="run the same command again to go on",
         )
     return FetchError(
-        f"{urlsplit(url).netloc} cannot be reached", where=url, found=_reason(error), fix=offline
+        f"{urlsplit(url).netloc} cannot be reached",
+        where=url,
+        found=_reason(error),
+        fix="check the network and the proxy (HTTPS_PROXY). Without a network: run this command "
+        "with --clip-dir FOLDER on a machine that has one, bring the folder, and name it with "
+        "--clip-dir or BRRP_CLIP_DIR",
     )
 
 
