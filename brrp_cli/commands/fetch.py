@@ -16,7 +16,7 @@ from brrp_cli.retrieval.clip_files import CLIP_DIR_VARIABLE, clip_cache, named_c
     type=click.Choice(["full", "8bit"]),
     default="full",
     show_default=True,
-    help="full: 601 MB. 8bit: 154 MB, and answers that differ a little.",
+    help="full: 601 MB. 8bit: 154 MB, the same weights rounded.",
 )
 @click.option(
     "--clip-dir",

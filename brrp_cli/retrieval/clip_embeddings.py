@@ -108,7 +108,8 @@ def _find_kept(
         if belongs or (belongs is None and made_beside == vision_sha256):
             return kept
         others.append(kept)
-    for kept in others:
+    if others:
+        kept = others[0]
         refuse_mismatch(kept.text_sha256, vision_sha256, text=kept.source, vision=vision)
         raise RetrievalError(
             "The text embeddings kept with the prior were made beside another vision model",
