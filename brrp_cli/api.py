@@ -1,4 +1,4 @@
-"""From a frame and a prior to every object's surface, in Python.
+"""From a frame, and a prior where the method has one, to every object's surface, in Python.
 
 from brrp_cli import load_frame, open_prior, reconstruct
 result = reconstruct(load_frame("frame.npz"), open_prior("prior/"))
@@ -12,14 +12,15 @@ import logging
 import time
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from brrp_cli.config import Config, preset
+from brrp_cli.config import Config, VPrismConfig, preset
 from brrp_cli.errors import BrrpError, PriorError
 from brrp_cli.frames.frame import Frame
 from brrp_cli.frames.observe import ObjectObservation, observe
 from brrp_cli.frames.plane import Plane
 from brrp_cli.methods.base import FAILED, NO_SURFACE, OK, TOO_FEW_POINTS, ObjectReconstruction
+from brrp_cli.methods.registry import METHODS
 from brrp_cli.prior.parameters import differences
 from brrp_cli.prior.store import Prior
 from brrp_cli.progress import progress
@@ -35,6 +36,8 @@ class Reconstruction:
     """Everything that is known of a frame's objects, and how it came about.
 
     objects : one for each id in the mask, ascending; plane : the support plane, camera frame;
+    retriever, prior_path, prior_digest : None where the method has no prior
+    configuration : what decided the result, plain JSON
     seconds : time of the stages that concern the whole frame.
     """
 
@@ -42,10 +45,10 @@ class Reconstruction:
     objects: list[ObjectReconstruction]
     plane: Plane | None
     method: str
-    retriever: str
-    prior_path: Path
-    prior_digest: str
-    config: Config
+    retriever: str | None
+    prior_path: Path | None
+    prior_digest: str | None
+    configuration: dict[str, Any]
     seed: int
     device: str
     seconds: dict[str, float] = field(default_factory=dict)
@@ -88,23 +91,32 @@ def check_features(prior: Prior, config: Config) -> None:
 
 def reconstruct(
     frame: Frame,
-    prior: Prior,
+    prior: Prior | None = None,
     *,
+    method: str = "brrp",
     config: Config | None = None,
     retriever: Retriever | None = None,
     seed: int = 0,
     device: str = "auto",
 ) -> Reconstruction:
-    """Reconstruct every object of a segmented frame with BRRP.
+    """Reconstruct every object of a segmented frame.
 
-    retriever : P(c|R); without one, CLIP if `BRRP_CLIP_DIR` is set or CLIP was fetched, and
-    registration fitness otherwise. An object that cannot be reconstructed gets a status; the
-    others still are. The frame is never changed. The same seed gives the same result.
+    method : "brrp", which needs a prior, or "vprism", which has none, runs on the CPU and takes
+    the surface alone from `config`
+    retriever : P(c|R); without one, CLIP if `BRRP_CLIP_DIR` is set or CLIP was fetched, else
+    appearance, else (with a prior of an older brrp) registration fitness. An object that cannot be
+    reconstructed gets a status; the others still are. The frame is never changed. The same seed
+    gives the same result.
+
+    Errors: BrrpError for an unknown method, or a prior or retriever that it lacks or cannot use.
     """
+    _check_method(method, prior, retriever)
+    config = config or preset("default")
+    if prior is None:
+        return _vprism(frame, config, seed)
     from brrp_cli.methods.brrp import reconstruct_object
     from brrp_cli.retrieval.choose import choose_retriever
 
-    config = config or preset("default")
     check_features(prior, config)
     device = pick_device(device)
     seconds: dict[str, float] = {}
@@ -136,13 +148,52 @@ def reconstruct(
         frame=frame,
         objects=objects,
         plane=scene.plane,
-        method="brrp",
+        method=method,
         retriever=retriever.name,
         prior_path=prior.path,
         prior_digest=prior.digest,
-        config=config,
+        configuration=config.as_dict(),
         seed=seed,
         device=device,
+        seconds=seconds,
+    )
+
+
+def _check_method(method: str, prior: Prior | None, retriever: Retriever | None) -> None:
+    """BrrpError unless there is such a method and it has the prior that it needs, and no other."""
+    if method not in METHODS:
+        raise BrrpError("No such method", found=method, expected=", ".join(METHODS))
+    if METHODS[method].uses_prior and prior is None:
+        raise PriorError(f"{method} needs a prior", fix="pass open_prior(PATH), or method='vprism'")
+    if not METHODS[method].uses_prior and not (prior is None and retriever is None):
+        raise BrrpError(
+            f"{method} uses no prior", found="a prior or a retriever", fix="leave them out"
+        )
+
+
+def _vprism(frame: Frame, config: Config, seed: int) -> Reconstruction:
+    """The frame's objects in one map, without a prior; surfaces as `config` asks for them."""
+    from brrp_cli.frames.scene_samples import sample_scene
+    from brrp_cli.methods.vprism import reconstruct_scene
+
+    own = VPrismConfig()
+    start = time.perf_counter()
+    scene = sample_scene(frame, own.observation, seed)
+    seconds = {"observation": time.perf_counter() - start}
+    objects = reconstruct_scene(scene, own, seed)
+    for item in progress(objects, "surfaces"):
+        _add_surface(item, config)
+    return Reconstruction(
+        frame=frame,
+        objects=objects,
+        plane=scene.plane,
+        method="vprism",
+        retriever=None,
+        prior_path=None,
+        prior_digest=None,
+        configuration={**asdict(own), "surface": asdict(config.surface)},
+        seed=seed,
+        device="cpu",
         seconds=seconds,
     )
 

@@ -26,12 +26,14 @@ def note(text: str) -> None:
 
 def progress(items: Iterable[T], label: str, total: int | None = None) -> Iterable[T]:
     """The same items, counted by a bar on stderr if that is a terminal."""
+    # Without a bar no tqdm either: it makes a lock between processes even when it is disabled.
+    if quiet() or not sys.stderr.isatty():
+        return items
     from tqdm import tqdm
 
     if total is None and isinstance(items, Sized):
         total = len(items)
-    disable = quiet() or not sys.stderr.isatty()
-    bar: Iterable[T] = tqdm(items, desc=label, total=total, file=sys.stderr, disable=disable)
+    bar: Iterable[T] = tqdm(items, desc=label, total=total, file=sys.stderr)
     return bar
 
 

@@ -14,6 +14,8 @@ the folder with YCB's archives unpacked, NNN_name/google_16k/textured.obj):
     python tools/make_scenes.py --meshes random_shapes --scenes 20 -o scenes/other
 
 and each with `--noise structured-light -o scenes/..._noise`. Sets to tune on: `--seed 1000`.
+`--light varied` draws colour and brightness of the light, gamma and pixel noise for each scene;
+what stands where stays as it is.
 
 Objects collide as convex hulls (tools/tabletop/settle.py says what that means). A pixel without a
 return has depth buffer 1.0, the far plane.
@@ -37,7 +39,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from tabletop.check import MIN_PIXELS, Distance, check_scene
 from tabletop.models import find_meshes
-from tabletop.scene import LIMITS, Plan, make_scene
+from tabletop.scene import LIGHTS, LIMITS, Plan, make_scene
 
 from brrp_cli.dependencies import import_library
 from brrp_cli.errors import BrrpError, SceneError
@@ -69,6 +71,7 @@ def _size(_context: click.Context, _option: click.Parameter, value: str) -> tupl
 @click.option("--views", default=2, show_default=True, type=click.IntRange(1))
 @click.option("--seed", default=0, show_default=True)
 @click.option("--noise", default="none", show_default=True, type=click.Choice(list(LIMITS)))
+@click.option("--light", default="plain", show_default=True, type=click.Choice(list(LIGHTS)))
 @click.option("--size", default="640x480", show_default=True, callback=_size)
 @click.option("--workers", default=1, show_default=True, type=click.IntRange(1))
 @click.option("--overwrite", is_flag=True, help="Replace scenes that are there.")
@@ -83,6 +86,7 @@ def main(
     views: int,
     seed: int,
     noise: str,
+    light: str,
     size: tuple[int, int],
     workers: int,
     overwrite: bool,
@@ -105,7 +109,7 @@ def main(
         found = tuple(path.absolute() for path in find_meshes(meshes, only, skip))
         if not found[0].is_relative_to(data_root):
             raise click.UsageError(f"{meshes} does not lie below --data-root {data_root}")
-        plan = Plan(found, data_root, output, seed, views, noise, size, overwrite)
+        plan = Plan(found, data_root, output, seed, views, noise, size, overwrite, light)
         _report(list(_make_all(plan, scenes, workers)), output)
     except BrrpError as error:
         raise click.ClickException(str(error)) from error

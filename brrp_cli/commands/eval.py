@@ -9,6 +9,7 @@ from typing import Any
 
 import click
 
+from brrp_cli.commands.retriever_option import RetrieverName
 from brrp_cli.config import PRESETS
 from brrp_cli.methods.registry import METHODS
 from brrp_cli.progress import note
@@ -16,7 +17,7 @@ from brrp_cli.retrieval.choose import RETRIEVERS
 from brrp_cli.retrieval.clip_files import CLIP_DIR_VARIABLE
 
 SOME_FAILED = 3
-ABLATIONS = ("truth", "uniform")
+ABLATIONS = ("truth",)
 
 
 def _several(kind: click.ParamType) -> Callable[..., list[Any]]:
@@ -78,8 +79,9 @@ def _selection(ctx: click.Context, option: click.Parameter, value: str | None) -
     "retrievers",
     multiple=True,
     default=["auto"],
-    callback=_several(click.Choice([*RETRIEVERS, *ABLATIONS])),
-    help=f"Of {', '.join([*RETRIEVERS, *ABLATIONS])}. [default: auto]",
+    callback=_several(RetrieverName([*RETRIEVERS, *ABLATIONS])),
+    help=f"Of {', '.join([*RETRIEVERS, *ABLATIONS])}, or a JSON or CSV file with probabilities. "
+    "[default: auto]",
 )
 @click.option(
     "--clip-dir",

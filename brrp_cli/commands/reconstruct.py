@@ -8,25 +8,46 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
+from click.core import ParameterSource
 
+from brrp_cli.commands.retriever_option import RetrieverName
 from brrp_cli.config import PRESETS, preset
+from brrp_cli.methods.registry import METHODS
 from brrp_cli.progress import note
 from brrp_cli.retrieval.choose import RETRIEVERS, choose_retriever
 from brrp_cli.retrieval.clip_files import CLIP_DIR_VARIABLE
 
 if TYPE_CHECKING:
     from brrp_cli.api import Reconstruction
+    from brrp_cli.config import Config
+    from brrp_cli.prior.store import Prior
+    from brrp_cli.retrieval.base import Retriever
 
 SOME_FAILED = 3
+# Options that mean nothing to a method without a prior.
+OF_A_PRIOR = ("prior_path", "preset_name", "k", "retriever", "clip_dir")
 
 
 @click.command("reconstruct")
 @click.argument("frame_path", metavar="FRAME.npz", type=click.Path(path_type=Path))
 @click.option("--prior", "prior_path", type=click.Path(path_type=Path), help="The prior to use.")
-@click.option("-o", "--output", type=click.Path(path_type=Path), help="[default: FRAME_brrp/]")
+@click.option("-o", "--output", type=click.Path(path_type=Path), help="[default: FRAME_METHOD/]")
+@click.option(
+    "--method",
+    type=click.Choice(list(METHODS)),
+    default="brrp",
+    show_default=True,
+    help="vprism: one map of the whole frame, without a prior.",
+)
 @click.option("--preset", "preset_name", type=click.Choice(list(PRESETS)), default="default")
 @click.option("--k", type=click.IntRange(min=1), help="Retrieved objects. [default: the preset's]")
-@click.option("--retriever", type=click.Choice(RETRIEVERS), default="auto", show_default=True)
+@click.option(
+    "--retriever",
+    type=RetrieverName(RETRIEVERS),
+    default="auto",
+    show_default=True,
+    help=f"{', '.join(RETRIEVERS)}, or a JSON or CSV file with probabilities.",
+)
 @click.option(
     "--clip-dir",
     type=click.Path(path_type=Path),
@@ -41,6 +62,7 @@ def command(
     frame_path: Path,
     prior_path: Path | None,
     output: Path | None,
+    method: str,
     preset_name: str,
     k: int | None,
     retriever: str,
@@ -54,31 +76,36 @@ def command(
     """Turn a segmented RGBD frame into a closed mesh for every object.
 
     The prior is --prior, else BRRP_PRIOR, else the one in the user's data folder, else the
-    starter prior. Meshes are in metres, in the camera frame unless --frame world is given.
+    starter prior; --method vprism has none. Meshes are in metres, in the camera frame unless
+    --frame world is given.
 
     \b
     Example:
       brrp reconstruct frame.npz
       brrp reconstruct frame.npz --prior prior/ --preset paper -o out/ --seed 1
+      brrp reconstruct frame.npz --method vprism
     """
     from brrp_cli.api import reconstruct
     from brrp_cli.frames.readers import read_frame
-    from brrp_cli.prior.store import open_prior
     from brrp_cli.surface.results import check_output, write_results
-    from brrp_cli.which_prior import locate_prior
 
-    output = output or frame_path.with_name(f"{frame_path.stem}_brrp")
+    uses_prior = METHODS[method].uses_prior
+    if not uses_prior:
+        refuse_options(method, device)
+    output = output or frame_path.with_name(f"{frame_path.stem}_{method}")
     # What can be refused is refused before the work, not after it.
     frame = read_frame(frame_path, depth_scale=depth_scale)
     check_output(output, frame, coordinates, overwrite=overwrite)
-    located, how = locate_prior(prior_path)
-    prior = open_prior(located)
-    note(f"Prior: {located} ({how}), {len(prior.names)} objects")
     config = preset(preset_name)
     config = replace(config, k=k) if k else config
-    chosen = choose_retriever(retriever, prior, config, seed, clip_dir=clip_dir)
-    note(f"Retrieval: {chosen.name}")
-    result = reconstruct(frame, prior, config=config, retriever=chosen, seed=seed, device=device)
+    prior, chosen = None, None
+    if uses_prior:
+        prior, chosen = open_retrieval(prior_path, config, retriever, clip_dir, seed)
+    else:
+        note(f"Method: {method}, without a prior")
+    result = reconstruct(
+        frame, prior, method=method, config=config, retriever=chosen, seed=seed, device=device
+    )
     write_results(result, output, frame=coordinates, overwrite=overwrite)
     report(result)
     done = len(result.reconstructed)
@@ -90,11 +117,43 @@ def command(
         sys.exit(SOME_FAILED)
 
 
+def refuse_options(method: str, device: str) -> None:
+    """UsageError if options were typed that mean nothing to a method without a prior."""
+    context = click.get_current_context()
+    typed = [
+        option.opts[-1]
+        for option in context.command.params
+        if option.name in OF_A_PRIOR
+        and context.get_parameter_source(option.name) is ParameterSource.COMMANDLINE
+    ]
+    if typed:
+        raise click.UsageError(f"--method {method} has no prior, so leave out {', '.join(typed)}")
+    if device == "cuda":
+        raise click.UsageError(f"--method {method} runs on the CPU alone")
+
+
+def open_retrieval(
+    prior_path: Path | None, config: Config, retriever: str, clip_dir: Path | None, seed: int
+) -> tuple[Prior, Retriever]:
+    """The prior and the retriever of its objects; says which they are."""
+    from brrp_cli.prior.store import open_prior
+    from brrp_cli.which_prior import locate_prior
+
+    located, how = locate_prior(prior_path)
+    prior = open_prior(located)
+    note(f"Prior: {located} ({how}), {len(prior.names)} objects")
+    chosen = choose_retriever(retriever, prior, config, seed, clip_dir=clip_dir)
+    note(f"Retrieval: {chosen.name}")
+    return prior, chosen
+
+
 def report(result: Reconstruction) -> None:
     """Print a line for each object."""
     for item in result.objects:
         best = item.retrieved[0] if item.retrieved else None
         match = f"{best.name} {best.probability:.2f}" if best else ""
+        if item.unknown_probability >= 0.5:
+            match += f" (not in the prior: {item.unknown_probability:.2f})"
         seconds = f"{sum(item.seconds.values()):.1f} s" if item.seconds else ""
         text = "; ".join(part for part in (match, item.message, seconds) if part)
         note(f"  object {item.object_id}: {item.status}  {text}")

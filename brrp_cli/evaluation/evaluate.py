@@ -27,10 +27,11 @@ from brrp_cli.evaluation.summary import (
 )
 from brrp_cli.evaluation.true_meshes import truth_cache
 from brrp_cli.evaluation.variants import Variant, expand, same_results, short_labels
-from brrp_cli.files import write_bytes
+from brrp_cli.files import sha256_file, write_bytes
 from brrp_cli.methods.registry import METHODS
+from brrp_cli.prior.store import Prior
 from brrp_cli.progress import progress
-from brrp_cli.retrieval.choose import resolve_name
+from brrp_cli.retrieval.choose import USE_CLIP, resolve_name
 from brrp_cli.retrieval.clip_files import clip_folder, need_clip_folder
 from brrp_cli.version import __version__
 
@@ -75,16 +76,17 @@ def evaluate(request: Request, say: Callable[[str], None] = lambda text: None) -
     if the folder holds a different run and `overwrite` is false.
     """
     scenes = find_scenes(request.scenes, request.selection)
+    opened = _prior(request)
+    prior = None if opened is None else {"path": str(opened.path), "digest": opened.digest}
     variants = expand(
         request.methods,
         request.presets,
         request.ks,
-        [resolve_name(name, request.clip_dir) for name in request.retrievers],
+        [resolve_name(name, request.clip_dir, opened) for name in request.retrievers],
         request.shifts,
     )
-    prior = _prior(request)
-    if any(variant.retriever == "clip" for variant in variants):
-        _prepare_clip(prior, need_clip_folder(request.clip_dir))
+    if any(variant.retriever in USE_CLIP for variant in variants):
+        _prepare_clip(opened, need_clip_folder(request.clip_dir))
     parameters = _parameters(request, scenes, variants, prior)
     workers = request.workers or len(os.sched_getaffinity(0))
     labels = short_labels(variants)
@@ -157,25 +159,24 @@ def machine() -> str:
     )
 
 
-def _prior(request: Request) -> dict[str, str] | None:
-    """Path and digest, where a method needs a prior. Errors: PriorError."""
+def _prior(request: Request) -> Prior | None:
+    """The prior, where a method needs one. Errors: PriorError."""
     from brrp_cli.prior.store import open_prior
     from brrp_cli.which_prior import locate_prior
 
     if not any(METHODS[name].uses_prior for name in request.methods):
         return None
     path, _ = locate_prior(request.prior)
-    return {"path": str(path), "digest": open_prior(path).digest}
+    return open_prior(path)
 
 
-def _prepare_clip(prior: dict[str, str] | None, folder: Path) -> None:
+def _prepare_clip(prior: Prior | None, folder: Path) -> None:
     """Embed the descriptions once, so that no worker has to; a missing model is told now, not in
     every row."""
-    from brrp_cli.prior.store import open_prior
     from brrp_cli.retrieval.clip import keep_descriptions
 
     assert prior is not None
-    keep_descriptions(open_prior(prior["path"]), folder)
+    keep_descriptions(prior, folder)
 
 
 def _parameters(
@@ -186,7 +187,8 @@ def _parameters(
 ) -> dict[str, Any]:
     """What decides the rows."""
     clip = clip_folder(request.clip_dir)
-    uses_clip = any(variant.retriever == "clip" for variant in variants)
+    uses_clip = any(variant.retriever in USE_CLIP for variant in variants)
+    files = {v.retriever for v in variants if v.retriever and Path(v.retriever).is_file()}
     return {
         "brrp": __version__,
         "scenes": str(request.scenes.resolve()),
@@ -195,6 +197,7 @@ def _parameters(
         "scenes_last": scenes[-1].name,
         "prior_digest": None if prior is None else prior["digest"],
         "clip": str(clip) if uses_clip else None,
+        "tables": {file: sha256_file(Path(file)) for file in sorted(files)},
         "noise": request.noise,
         "seed": request.seed,
         "variants": {variant.label: variant.configuration for variant in variants},

@@ -24,6 +24,7 @@ from brrp_cli.methods.base import FAILED, ObjectReconstruction
 from brrp_cli.methods.registry import METHODS, Setup
 from brrp_cli.prior.objects import PriorObject
 from brrp_cli.prior.store import Prior, open_prior
+from brrp_cli.retrieval.base import unknown
 from brrp_cli.retrieval.remember import RememberingRetriever
 from brrp_cli.seeds import child_rng
 
@@ -104,13 +105,11 @@ def _memory_key(variant: Variant) -> str:
 
 
 def _retriever(plan: Plan, scene: Scene, variant: Variant, prior: Prior) -> Retriever:
-    from brrp_cli.retrieval.given import TruthRetriever, UniformRetriever
+    from brrp_cli.retrieval.given import TruthRetriever
 
     assert variant.retriever is not None and plan.prior is not None
     if variant.retriever == "truth":
         return TruthRetriever(prior.names, {o.id: o.name for o in scene.objects})
-    if variant.retriever == "uniform":
-        return UniformRetriever(prior.names)
     return _found_retriever(variant.retriever, plan.prior, variant.config, plan.seed, plan.clip_dir)
 
 
@@ -191,9 +190,11 @@ def _retrieval(
         "in_prior": true_name in names,
         "placed": sum(r.T_cam_object is not None for r in item.retrieved),
     }
+    answer = retriever.answers.get(item.object_id)
+    if answer is not None:
+        row["not_in_prior"] = unknown(answer)
     if item.retrieved:
         row |= {"best": item.retrieved[0].name, "best_probability": item.retrieved[0].probability}
-    answer = retriever.answers.get(item.object_id)
     if true_name in names and answer is not None:
         mine = float(answer[names.index(true_name)])
         row |= {"true_rank": 1 + int(np.sum(answer > mine)), "true_probability": mine}

@@ -35,6 +35,7 @@ RESULT = (
     "points",
     *METRICS,
     "in_prior",
+    "not_in_prior",
     "true_rank",
     "true_probability",
     "best",

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from brrp_cli.config import ObservationConfig
 from brrp_cli.frames.frame import BACKGROUND, Frame
 from brrp_cli.frames.observe import below_samples, box_center, ray_samples
-from brrp_cli.frames.plane import fit_plane
+from brrp_cli.frames.plane import Plane, fit_plane
 from brrp_cli.frames.subsample import grid_subsample
 
 log = logging.getLogger(__name__)
@@ -32,6 +32,7 @@ class SceneSamples:
     centers : object id -> (3,) float64, the middle of their bounding box
     samples : (S, 3) float32
     labels : (S,) int64; FREE, or 1 + the place of the object's id in `points`
+    plane : the support plane, camera frame; None where none was found or no object asks for one
     too_few : id -> number of valid points, for objects that have too few of them for a class
     """
 
@@ -39,6 +40,7 @@ class SceneSamples:
     centers: dict[int, NDArray[np.float64]]
     samples: NDArray[np.float32]
     labels: NDArray[np.int64]
+    plane: Plane | None = None
     too_few: dict[int, int] = field(default_factory=dict)
 
 
@@ -49,22 +51,23 @@ def sample_scene(frame: Frame, config: ObservationConfig, seed: int) -> SceneSam
     points = {i: p for i, p in seen.items() if i not in too_few}
     centers = {i: box_center(p) for i, p in points.items()}
     surfaces = [grid_subsample(p, config.surface_cell) for p in points.values()]
-    free = _free_samples(frame, centers, config, seed)
+    free, plane = _free_samples(frame, centers, config, seed)
     groups = [free, *surfaces]
     return SceneSamples(
         points=points,
         centers=centers,
         samples=np.concatenate(groups),
         labels=np.repeat(np.arange(len(groups)), [len(group) for group in groups]),
+        plane=plane,
         too_few=too_few,
     )
 
 
 def _free_samples(
     frame: Frame, centers: dict[int, NDArray[np.float64]], config: ObservationConfig, seed: int
-) -> NDArray[np.float32]:
+) -> tuple[NDArray[np.float32], Plane | None]:
     if not centers:
-        return np.empty((0, 3), np.float32)
+        return np.empty((0, 3), np.float32), None
     middles = np.array(list(centers.values()))
     free = [ray_samples(frame.points[frame.valid], middles, config, seed)]
     background = frame.points[frame.valid & (frame.segmap == BACKGROUND)]
@@ -73,4 +76,4 @@ def _free_samples(
         log.warning("No support plane near the objects: nothing is sampled below one")
     else:
         free += [below_samples(c, plane, config, seed, i) for i, c in centers.items()]
-    return grid_subsample(np.concatenate(free), config.free_cell)
+    return grid_subsample(np.concatenate(free), config.free_cell), plane

@@ -86,6 +86,7 @@ class ObjectReconstruction:
     n_points : valid observed points; observed : (n, 3) those points, metres, camera frame;
     center : (3,) centre of their bounding box
     posterior, surface : None unless the object got that far
+    unknown_probability : that the prior does not hold the object; 0 where retrieval cannot tell
     seconds : time of each stage
     """
 
@@ -96,6 +97,7 @@ class ObjectReconstruction:
     center: NDArray[np.float64] | None = None
     observed: NDArray[np.float32] | None = None
     retrieved: list[Retrieved] = field(default_factory=list)
+    unknown_probability: float = 0.0
     posterior: OccupancyPosterior | None = None
     surface: Surface | None = None
     seconds: dict[str, float] = field(default_factory=dict)

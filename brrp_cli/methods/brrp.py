@@ -17,7 +17,7 @@ from brrp_cli.methods.base import OK, ObjectReconstruction, Retrieved
 from brrp_cli.prior.objects import PriorObject
 from brrp_cli.prior.store import Prior
 from brrp_cli.registration.scan import ObservedCloud, observed_cloud, register
-from brrp_cli.retrieval.base import Retriever, top_k
+from brrp_cli.retrieval.base import Retriever, top_k, unknown
 from brrp_cli.seeds import child_seed
 
 
@@ -71,6 +71,7 @@ def reconstruct_object(
         center=observation.center,
         observed=observation.points,
         retrieved=[found for _, found in placed],
+        unknown_probability=unknown(probabilities),
         posterior=posterior,
         seconds=seconds,
     )

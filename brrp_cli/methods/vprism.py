@@ -36,6 +36,7 @@ class VPrismPosterior:
 
     def probability(self, points: NDArray[np.floating]) -> NDArray[np.float32]:
         """Probability (n,) that points (n, 3), metres, camera frame, belong to this object."""
+        points = np.asarray(points)
         inside = ((points >= self.bounds[0]) & (points <= self.bounds[1])).all(axis=1)
         classes = list(range(len(self.scene.mean)))
         mean, variance = self.scene.logits(points[inside], classes)
@@ -57,20 +58,30 @@ class VPrismPosterior:
 def reconstruct_vprism(frame: Frame, config: VPrismConfig, seed: int) -> list[ObjectReconstruction]:
     """Occupancy of every object of the frame, by id, ascending. The same seed gives the same bytes.
 
-    Objects with too few points for a class come back with that status. `seconds` holds each
-    object's equal share of the scene's time.
+    `seconds` holds each object's equal share of the scene's time.
     """
     start = perf_counter()
     scene = sample_scene(frame, config.observation, seed)
-    observed = perf_counter()
+    seconds = perf_counter() - start
+    found = reconstruct_scene(scene, config, seed)
+    for item in found:
+        if item.posterior is not None:
+            item.seconds = {"observation": seconds / len(scene.points), **item.seconds}
+    return found
+
+
+def reconstruct_scene(
+    scene: SceneSamples, config: VPrismConfig, seed: int
+) -> list[ObjectReconstruction]:
+    """Occupancy of every object, by id, ascending, from the samples of its scene.
+
+    Objects with too few points for a class come back with that status.
+    """
+    start = perf_counter()
     found = [_too_few(i, n, config.observation.min_points) for i, n in scene.too_few.items()]
     if scene.points:
         fitted = fit_scene(scene, config, seed)
-        count = len(scene.points)
-        seconds = {
-            "observation": (observed - start) / count,
-            "inference": (perf_counter() - observed) / count,
-        }
+        seconds = {"inference": (perf_counter() - start) / len(scene.points)}
         found += [
             ObjectReconstruction(
                 object_id=object_id,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -26,6 +26,7 @@ from brrp_cli.prior.pack import pack
 from brrp_cli.prior.parameters import BuildParameters, refuse_differences
 from brrp_cli.prior.plan import plan_shards, shard_file
 from brrp_cli.prior.shard import StoredObject, open_shard, read_stored, write_shard
+from brrp_cli.prior.sidecar import is_whole, sidecar_file, write_sidecar
 from brrp_cli.prior.stock import Finished, Stock, take_stock
 from brrp_cli.prior.workers import cpu_count, run_tasks
 
@@ -79,7 +80,7 @@ def build_prior(
         run = _Run(out, table, sources, take_stock(out, before, table))
         run.hash_inputs(meshes)
         run.make(parameters or BuildParameters(), workers or cpu_count(), time_limit, progress)
-        manifest = run.manifest(phrases)
+        manifest = run.with_sidecar(run.manifest(phrases), before)
         if not manifest.objects:
             raise MeshError(
                 "None of the meshes became an object",
@@ -216,6 +217,16 @@ class _Run:
             ],
         )
 
+    def with_sidecar(self, manifest: Manifest, before: Manifest | None) -> Manifest:
+        """With the file of all objects' appearance, which is written unless it stands already."""
+        if not manifest.objects:
+            return manifest
+        entry = before.appearance if before is not None else None
+        file = sidecar_file(manifest.objects, self.parameters)
+        if entry is None or entry.file != file or not is_whole(self.out, entry):
+            entry = write_sidecar(self.out, manifest.objects, self.parameters)
+        return replace(manifest, appearance=entry)
+
 
 def make_stored(source: MeshSource, sha256: str, parameters: BuildParameters) -> StoredObject:
     """A worker's task: one mesh, as its shard holds it."""
@@ -241,11 +252,15 @@ def _previous(out: Path) -> Manifest | None:
 
 
 def _sweep(out: Path, manifest: Manifest) -> None:
-    """Delete shards that nothing refers to, and what killed runs left half written."""
+    """Delete files that nothing refers to, and what killed runs left half written."""
     listed = {out / shard.file for shard in manifest.shards}
+    if manifest.appearance is not None:
+        listed.add(out / manifest.appearance.file)
     for path in [
         *(out / "shards").glob("shard-*.h5"),
         *(out / "shards").glob(".shard-*.partial.h5"),
+        *out.glob("appearance-*.npy"),
+        *out.glob(".appearance-*.partial.npy"),
     ]:
         if path not in listed:
             path.unlink(missing_ok=True)

@@ -7,11 +7,13 @@ from importlib.metadata import version
 
 import numpy as np
 
-from brrp_cli.errors import BrrpError
+from brrp_cli.errors import BrrpError, MeshError
+from brrp_cli.prior.appearance import describe_appearance
 from brrp_cli.prior.clouds import feature_clouds, spread
 from brrp_cli.prior.find import MeshSource
 from brrp_cli.prior.meshes import load_mesh
 from brrp_cli.prior.objects import PriorObject
+from brrp_cli.prior.painted import PaintedMesh, load_painted, unpainted
 from brrp_cli.prior.parameters import BuildParameters
 from brrp_cli.prior.poses import resting_poses
 from brrp_cli.prior.repair import repair
@@ -25,23 +27,42 @@ def make_object(source: MeshSource, parameters: BuildParameters) -> PriorObject:
     """Load, repair, sample, describe geometrically. The description is left empty: the manifest
     holds it. Errors: MeshError, with the file in `where`."""
     original = load_mesh(source.path, parameters.units)
+    painted, trouble = _painted(source, original.copy(), parameters)
     try:
-        return _from_mesh(source.name, original, parameters)
+        return _from_mesh(source.name, original, painted, trouble, parameters)
     except BrrpError as error:
         error.where = error.where or source.path
         raise
 
 
-def _from_mesh(name: str, original, parameters: BuildParameters) -> PriorObject:  # type: ignore[no-untyped-def]
+def _painted(  # type: ignore[no-untyped-def]
+    source: MeshSource, original, parameters: BuildParameters
+) -> tuple[PaintedMesh, str | None]:
+    """The mesh with its colours; without them, and why, where they cannot be read."""
+    try:
+        return load_painted(source.path, parameters.units), None
+    except MeshError as error:
+        return unpainted(original), " ".join(str(error.found).split())
+
+
+def _from_mesh(  # type: ignore[no-untyped-def]
+    name: str,
+    original,
+    painted: PaintedMesh,
+    trouble: str | None,
+    parameters: BuildParameters,
+) -> PriorObject:
     # Far from the origin float32 has no digits left for the shape: work around the centre.
     offset = original.bounds.mean(axis=0)
     original.apply_translation(-offset)
     with np.errstate(divide="ignore", invalid="ignore"):  # trimesh: centres of flat parts
         repaired = repair(original)
     mesh = repaired.mesh
+    poses = resting_poses(mesh, parameters.poses)
+    appearance = describe_appearance(painted, mesh, poses, parameters.appearance)
     poses = [
         dataclasses.replace(pose, T_plane_object=_moved(pose.T_plane_object, -offset))
-        for pose in resting_poses(mesh, parameters.poses)
+        for pose in poses
     ]
     center = mesh.bounds.mean(axis=0)
     extents = mesh.extents.copy()
@@ -74,8 +95,11 @@ def _from_mesh(name: str, original, parameters: BuildParameters) -> PriorObject:
             "repair": repaired.record,
             "inside_share": float(labels.mean()),
             "poses": len(poses),
+            "coloured": bool(appearance.colour.any()),
+            **({"colours_unread": trouble} if trouble else {}),
             "made_with": {library: library_version(library) for library in LIBRARIES},
         },
+        appearance=appearance,
     )
 
 

@@ -1,9 +1,10 @@
 """manifest.json: what a prior consists of. It is written last; it is the commit.
 
 Keys: kind, schema, parameters, objects (sorted by name; each with name, description, source,
-input_sha256, shard, half_extent, record), shards (file, sha256, bytes), failed (name, source,
-reason), libraries (versions that the objects were made with). No times and no absolute paths: the
-same seed and meshes give the same bytes.
+input_sha256, shard, half_extent, record), shards (file, sha256, bytes), appearance (file, sha256,
+bytes; see sidecar.py), failed (name, source, reason), libraries (versions that the objects were
+made with). Schema 1 had no appearance. No times and no absolute paths: the same seed and meshes give
+the same bytes.
 """
 
 from __future__ import annotations
@@ -16,9 +17,9 @@ from typing import Any
 
 from brrp_cli.errors import PriorError
 from brrp_cli.files import write_bytes
-from brrp_cli.prior.plan import SHARD_NAME
+from brrp_cli.prior.plan import APPEARANCE_NAME, SHARD_NAME
 
-SCHEMA = 1
+SCHEMA = 2
 KIND = "brrp-prior"
 FILE = "manifest.json"
 
@@ -65,18 +66,22 @@ class Manifest:
     objects: list[ObjectEntry]
     shards: list[ShardEntry]
     failed: list[Failure]
+    appearance: ShardEntry | None = None
 
     def as_bytes(self) -> bytes:
         """The file's bytes."""
         table = {
             "kind": KIND,
-            "schema": SCHEMA,
+            # One that was read gives the bytes that it was read from.
+            "schema": 1 if self.appearance is None else SCHEMA,
             "parameters": self.parameters,
             "libraries": self.libraries,
             "objects": [asdict(entry) for entry in self.objects],
             "shards": [asdict(entry) for entry in self.shards],
             "failed": [asdict(entry) for entry in self.failed],
         }
+        if self.appearance is not None:
+            table["appearance"] = asdict(self.appearance)
         return (json.dumps(table, indent=1, ensure_ascii=False, sort_keys=True) + "\n").encode()
 
     @property
@@ -118,6 +123,7 @@ def read_manifest(folder: Path) -> Manifest:
             objects=[ObjectEntry(**entry) for entry in table["objects"]],
             shards=[ShardEntry(**entry) for entry in table["shards"]],
             failed=[Failure(**entry) for entry in table["failed"]],
+            appearance=ShardEntry(**table["appearance"]) if "appearance" in table else None,
         )
         _check(manifest)
     except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
@@ -153,6 +159,8 @@ def _check(manifest: Manifest) -> None:
     for file in files:
         if not SHARD_NAME.fullmatch(file):
             raise ValueError(f"a shard named {file!r}")
+    if manifest.appearance and not APPEARANCE_NAME.fullmatch(manifest.appearance.file):
+        raise ValueError(f"a file of descriptors named {manifest.appearance.file!r}")
     names = [entry.name for entry in manifest.objects]
     if len(set(names)) < len(names):
         raise ValueError("an object that stands there twice")

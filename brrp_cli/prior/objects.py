@@ -8,6 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from brrp_cli.appearance.descriptor import Appearance
+
 
 @dataclass(frozen=True)
 class FeatureCloud:
@@ -47,6 +49,7 @@ class PriorObject:
         base_scale * scale: metres, centred on the bounding box
     poses : resting poses, most probable first
     record : how it was made (repair, sample mix, original size); plain JSON
+    appearance : what it looks like; None in a prior of an older brrp
     """
 
     name: str
@@ -60,3 +63,4 @@ class PriorObject:
     clouds: dict[float, FeatureCloud]
     poses: list[RestingPose]
     record: dict[str, Any]
+    appearance: Appearance | None = None

@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
-import numpy as np
+from dataclasses import fields
+from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
+from brrp_cli.appearance.descriptor import Appearance
 from brrp_cli.geometry import normalise
 from brrp_cli.prior.objects import FeatureCloud, PriorObject, RestingPose
-from brrp_cli.prior.shard import ARRAYS, StoredObject
+from brrp_cli.prior.shard import APPEARANCE, ARRAYS, StoredObject
 
 
 def pack(item: PriorObject, input_sha256: str) -> StoredObject:
@@ -26,7 +31,9 @@ def pack(item: PriorObject, input_sha256: str) -> StoredObject:
         "pose_T": np.stack([pose.T_plane_object for pose in item.poses]),
         "pose_probability": np.array([pose.probability for pose in item.poses]),
     }
-    typed = {key: arrays[key].astype(dtype) for key, (dtype, _) in ARRAYS.items()}
+    if item.appearance is not None:
+        arrays |= {f"{APPEARANCE}/{key}": value for key, value in vars(item.appearance).items()}
+    typed = {key: arrays[key].astype(ARRAYS[key][0]) for key in ARRAYS if key in arrays}
     return StoredObject(item.name, input_sha256, typed, item.record)
 
 
@@ -59,4 +66,13 @@ def unpack(stored: StoredObject, description: str) -> PriorObject:
             for T, p in zip(arrays["pose_T"], arrays["pose_probability"], strict=True)
         ],
         record=stored.record,
+        appearance=unpack_appearance(stored.arrays),
     )
+
+
+def unpack_appearance(arrays: dict[str, NDArray[Any]]) -> Appearance | None:
+    """The descriptors among a shard's arrays; None in a shard of an older brrp."""
+    found = {field.name: arrays.get(f"{APPEARANCE}/{field.name}") for field in fields(Appearance)}
+    if any(value is None for value in found.values()):
+        return None
+    return Appearance(**{key: value for key, value in found.items() if value is not None})

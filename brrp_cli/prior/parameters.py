@@ -37,6 +37,14 @@ class PoseConfig:
 
 
 @dataclass(frozen=True)
+class AppearanceConfig:
+    """How meshes are looked at for their appearance: directions, and rays for each."""
+
+    views: int = 32
+    rays: int = 3_000
+
+
+@dataclass(frozen=True)
 class BuildParameters:
     """All of it. `units`: what one unit of the mesh files is."""
 
@@ -48,6 +56,7 @@ class BuildParameters:
     dense_points: int = 20_000
     features: FeatureConfig = field(default_factory=FeatureConfig)
     poses: PoseConfig = field(default_factory=PoseConfig)
+    appearance: AppearanceConfig = field(default_factory=AppearanceConfig)
 
     def as_dict(self) -> dict[str, Any]:
         """As JSON gives it back: tuples are lists."""

@@ -10,6 +10,7 @@ from typing import Any
 
 MEAN_OBJECTS = 8
 MAX_OBJECTS = 16
+APPEARANCE_NAME = re.compile(r"appearance-[0-9a-f]{16}\.npy")
 SHARD_NAME = re.compile(r"shards/shard-[0-9a-f]{16}\.h5")
 
 

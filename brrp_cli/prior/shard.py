@@ -14,7 +14,11 @@
         cloud_fpfh     (p, 33) f2
         pose_T         (r, 4, 4) f8  T_plane_object, metres
         pose_probability (r,)  f8
-        appearance/            optional group, reserved for appearance descriptors
+        appearance/colour   (v, COLOUR_BINS) u1  square roots of histograms, 255 = 1; 0: no colours
+        appearance/pairs    (v, PAIR_BINS)   u1  likewise
+        appearance/sizes    (r, 3)  f4  metres: height, footprint in each resting pose
+
+Schema 1 had no appearance; its shards are still read.
 
 Every data set is chunked with fletcher32, shuffle and gzip. `content_sha256` covers the arrays and
 the record, so that an object can be taken over from a shard that no manifest vouches for.
@@ -33,16 +37,21 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from brrp_cli.appearance.colour import COLOUR_BINS
+from brrp_cli.appearance.descriptor import Appearance
+from brrp_cli.appearance.pairs import PAIR_BINS
 from brrp_cli.errors import PriorError
 from brrp_cli.files import atomic_path
 
 if TYPE_CHECKING:
     import h5py
 
-SCHEMA = 1
+SCHEMA = 2
 KIND = "brrp-prior-shard"
 MAX_ROWS = 10_000_000
 GZIP_LEVEL = 4
+
+APPEARANCE = "appearance"
 
 # data set -> (dtype, shape; a letter is a length, the same wherever it stands, "s+1" one more)
 ARRAYS: dict[str, tuple[str, tuple[int | str, ...]]] = {
@@ -58,8 +67,10 @@ ARRAYS: dict[str, tuple[str, tuple[int | str, ...]]] = {
     "cloud_fpfh": ("<f2", ("p", 33)),
     "pose_T": ("<f8", ("r", 4, 4)),
     "pose_probability": ("<f8", ("r",)),
+    f"{APPEARANCE}/colour": ("|u1", ("v", COLOUR_BINS)),
+    f"{APPEARANCE}/pairs": ("|u1", ("v", PAIR_BINS)),
+    f"{APPEARANCE}/sizes": ("<f4", ("r", 3)),
 }
-RESERVED = "appearance"
 
 
 @dataclass(frozen=True)
@@ -86,6 +97,8 @@ def write_shard(path: Path, objects: list[StoredObject], parameters: dict[str, A
             group.attrs["record"] = json.dumps(stored.record)
             group.attrs["content_sha256"] = _content_sha256(stored.arrays, stored.record)
             for key, (dtype, _) in ARRAYS.items():
+                if key not in stored.arrays:
+                    continue
                 group.create_dataset(
                     key,
                     data=stored.arrays[key].astype(dtype),
@@ -151,8 +164,11 @@ def read_stored(file: h5py.File, name: str) -> StoredObject:
     group = _hard(file["objects"], name, where)
     arrays: dict[str, NDArray[Any]] = {}
     lengths: dict[str, int] = {}
+    # Schema 1 has no appearance. Where one was taken out later, the checksum tells.
+    absent = f"{APPEARANCE}/" if APPEARANCE not in group else ()
     for key, (dtype, shape) in ARRAYS.items():
-        arrays[key] = _read_array(group, key, dtype, shape, lengths, where)
+        if not key.startswith(absent):
+            arrays[key] = _read_array(group, key, dtype, shape, lengths, where)
     record = json.loads(group.attrs["record"])
     if _content_sha256(arrays, record) != group.attrs["content_sha256"]:
         raise damaged(where, "data that do not have the object's checksum")
@@ -162,13 +178,28 @@ def read_stored(file: h5py.File, name: str) -> StoredObject:
     return StoredObject(name, str(group.attrs["input_sha256"]), arrays, record)
 
 
+def read_appearance(file: h5py.File, name: str) -> Appearance:
+    """Read one object's descriptors alone, with all checks but the checksum of the whole object."""
+    where = f"{file.filename}, {name}"
+    group = _hard(file["objects"], name, where)
+    lengths: dict[str, int] = {}
+    arrays = {
+        key.removeprefix(f"{APPEARANCE}/"): _read_array(group, key, dtype, shape, lengths, where)
+        for key, (dtype, shape) in ARRAYS.items()
+        if key.startswith(f"{APPEARANCE}/")
+    }
+    return Appearance(**arrays)
+
+
 def _hard(group: h5py.Group, key: str, where: str) -> Any:
     import h5py
 
     # Soft and external links may lead to any file that the user can read.
-    if key not in group or not isinstance(group.get(key, getlink=True), h5py.HardLink):
-        raise damaged(where, f"no data set {key}")
-    return group[key]
+    for part in key.split("/"):
+        if part not in group or not isinstance(group.get(part, getlink=True), h5py.HardLink):
+            raise damaged(where, f"no data set {key}")
+        group = group[part]
+    return group
 
 
 def _read_array(
@@ -202,6 +233,8 @@ def _read_array(
 def _content_sha256(arrays: dict[str, NDArray[Any]], record: dict[str, Any]) -> str:
     digest = hashlib.sha256(json.dumps(record, sort_keys=True).encode())
     for key, (dtype, _) in ARRAYS.items():
+        if key not in arrays:
+            continue
         array = np.ascontiguousarray(arrays[key].astype(dtype))
         digest.update(f"{key}{array.shape}".encode())
         digest.update(array.tobytes())

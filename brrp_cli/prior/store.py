@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from typing import Any
+
+from numpy.typing import NDArray
 
 from brrp_cli.errors import BrrpError
 from brrp_cli.files import sha256_file
@@ -12,6 +15,7 @@ from brrp_cli.prior.manifest import Manifest, ObjectEntry, ShardEntry, read_mani
 from brrp_cli.prior.objects import PriorObject
 from brrp_cli.prior.pack import unpack
 from brrp_cli.prior.shard import damaged, object_names, open_shard, read_stored
+from brrp_cli.prior.sidecar import is_whole, read_sidecar
 
 
 @dataclass
@@ -42,6 +46,12 @@ class Prior:
     def parameters(self) -> dict[str, Any]:
         """What the prior was built with: seed, samples, mix, features, ..."""
         return self.manifest.parameters
+
+    @cached_property
+    def appearance(self) -> NDArray[Any] | None:
+        """A row of descriptors for each name (see sidecar.py), mapped into memory; None in a prior
+        of an older brrp. Errors: PriorError."""
+        return read_sidecar(self.path, self.manifest)
 
     @property
     def digest(self) -> str:
@@ -94,6 +104,9 @@ def verify_prior(prior: Prior) -> list[str]:
                         raise damaged(f"{shard.file}, {name}", "not what the manifest tells of it")
         except BrrpError as error:
             problems.append(f"{shard.file}: {error.what}: {error.found or 'not there'}")
+    sidecar = prior.manifest.appearance
+    if sidecar is not None and not is_whole(prior.path, sidecar):
+        problems.append(f"{sidecar.file}: Missing or damaged; the next retrieval makes it again")
     listed = {shard.file for shard in prior.manifest.shards}
     for path in sorted((prior.path / "shards").glob("*.h5")):
         if f"shards/{path.name}" not in listed:

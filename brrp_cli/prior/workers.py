@@ -19,6 +19,8 @@ from typing import Any
 from brrp_cli.errors import BrrpError
 
 _CONTEXT = multiprocessing.get_context("spawn")
+# Seconds that a worker with nothing to do may take to end.
+PATIENCE = 10.0
 _ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
 
@@ -30,6 +32,11 @@ class _Worker:
     deadline: float = 0.0
 
     def stop(self) -> None:
+        if self.index is None:
+            # It ends by itself at the end of its pipe, and gives back what it holds: the named
+            # semaphores of a killed process (tqdm makes one) are left for Python to complain of.
+            self.pipe.close()
+            self.process.join(PATIENCE)
         self.process.kill()
         self.process.join()
         self.pipe.close()

@@ -25,8 +25,16 @@ class Retriever(Protocol):
     def probabilities(self, frame: Frame, object_id: int) -> NDArray[np.float64]:
         """P(c|R) (n,) for one object of the frame, in the order of the prior's names.
 
-        They may sum to less than 1: what is missing is P(not in the prior).
+        The sum is at most 1. What is missing from 1 is the probability that the prior does not hold
+        the object (`unknown`); a retriever that cannot tell gives a sum of 1.
         """
+
+
+def unknown(probabilities: NDArray[np.floating]) -> float:
+    """P(not in the prior | R), in [0, 1], of P(c|R) (n,)."""
+    # Sums of rounded numbers miss 1 by a little.
+    missing = 1.0 - float(np.sum(probabilities, dtype=np.float64))
+    return min(missing, 1.0) if missing > 1e-9 else 0.0
 
 
 def softmax(scores: NDArray[np.floating]) -> NDArray[np.float64]:

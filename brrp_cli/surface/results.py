@@ -14,7 +14,6 @@ from brrp_cli.errors import OutputError
 from brrp_cli.files import atomic_folder, check_writable, refuse_folder
 from brrp_cli.frames.frame import Frame
 from brrp_cli.geometry import transform_points
-from brrp_cli.inference.posterior import HilbertPosterior
 from brrp_cli.inference.posterior_file import save_posteriors
 from brrp_cli.methods.base import ObjectReconstruction, Retrieved, Surface
 from brrp_cli.surface.colours import scale_top, uncertainty_colours
@@ -48,15 +47,13 @@ def write_results(
         for object_id, mesh in meshes.items():
             mesh.export(partial / mesh_name(object_id))
         _scene(meshes).export(partial / "scene.glb")
-        posteriors = {
-            o.object_id: o.posterior
-            for o in result.objects
-            if isinstance(o.posterior, HilbertPosterior)
-        }
+        posteriors = {o.object_id: o.posterior for o in result.objects if o.posterior is not None}
         save_posteriors(posteriors, partial / "posterior.h5")
         record = json.dumps(result_record(result, frame), indent=2) + "\n"
         (partial / RECORD).write_text(record)
-        caption = f"retrieved by {result.retriever}"
+        caption = (
+            f"retrieved by {result.retriever}" if result.retriever else f"{result.method}, no prior"
+        )
         up = None if result.plane is None else result.plane.normal
         picture = preview(result.frame, result.objects, up=up, caption=caption)
         Image.fromarray(picture).save(partial / "preview.png")
@@ -136,7 +133,9 @@ def result_record(result: Reconstruction, frame: str) -> dict[str, Any]:
         "T_frame_cam": T_target_cam.tolist(),
         "method": result.method,
         "retriever": result.retriever,
-        "prior": {"path": str(result.prior_path), "digest": result.prior_digest},
+        "prior": None
+        if result.prior_path is None
+        else {"path": str(result.prior_path), "digest": result.prior_digest},
         "seed": result.seed,
         "device": result.device,
         "plane_cam": None
@@ -144,7 +143,7 @@ def result_record(result: Reconstruction, frame: str) -> dict[str, Any]:
         else {"normal": result.plane.normal.tolist(), "offset": result.plane.offset},
         "objects": [_object_record(o, T_target_cam) for o in result.objects],
         "seconds": _rounded(result.seconds),
-        "config": result.config.as_dict(),
+        "config": result.configuration,
         "versions": _versions(),
     }
 
@@ -157,6 +156,7 @@ def _object_record(item: ObjectReconstruction, T_target_cam: NDArray[np.float64]
         "points": item.n_points,
         "mesh": None if item.surface is None else mesh_name(item.object_id),
         **({} if item.surface is None else _surface_record(item.surface, T_target_cam)),
+        "not_in_prior": item.unknown_probability,
         "retrieved": [_retrieved_record(r, T_target_cam) for r in item.retrieved],
         "seconds": _rounded(item.seconds),
     }

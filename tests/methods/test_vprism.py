@@ -155,6 +155,12 @@ def test_a_point_is_answered_alike_alone_and_in_a_crowd(frame, found):
         np.testing.assert_allclose(alone, crowd[::97], rtol=1e-5, atol=1e-7)
 
 
+def test_a_plain_list_of_points_is_answered(found):
+    center = found[3].center
+    for ask in (found[3].posterior.probability, found[3].posterior.uncertainty):
+        np.testing.assert_array_equal(ask([list(center)]), ask(center[None]))
+
+
 def test_updates_in_parts_come_close_to_one_update(frame, found):
     points = to_camera(frame, grid_around(BOXES[3], 0.05, 0.01))
     config = replace(VPrismConfig(), max_update_points=8000)

@@ -4,6 +4,9 @@ import h5py
 import numpy as np
 import pytest
 
+from brrp_cli.appearance.colour import COLOUR_BINS
+from brrp_cli.appearance.descriptor import Appearance
+from brrp_cli.appearance.pairs import PAIR_BINS
 from brrp_cli.errors import PriorError
 from brrp_cli.prior.objects import FeatureCloud, PriorObject, RestingPose
 from brrp_cli.prior.pack import pack, unpack
@@ -30,6 +33,11 @@ def example(name: str = "cup", seed: int = 0) -> PriorObject:
         clouds={0.5: cloud(7), 1.22: cloud(13)},
         poses=[RestingPose(np.eye(4), 0.75), RestingPose(np.diag([1.0, -1, -1, 1]), 0.25)],
         record={"extents": [0.125, 0.0625, 0.03125], "repair": {"steps": []}},
+        appearance=Appearance(
+            colour=rng.integers(0, 256, (5, COLOUR_BINS), dtype=np.uint8),
+            pairs=rng.integers(0, 256, (5, PAIR_BINS), dtype=np.uint8),
+            sizes=rng.random((2, 3), dtype=np.float32),
+        ),
     )
 
 

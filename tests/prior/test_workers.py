@@ -2,6 +2,8 @@ import multiprocessing
 import os
 import signal
 import time
+from multiprocessing.util import Finalize
+from pathlib import Path
 
 from brrp_cli.errors import BrrpError, MeshError
 from brrp_cli.prior.workers import run_tasks
@@ -32,6 +34,17 @@ def test_each_task_ends_alone_whatever_becomes_of_it() -> None:
     assert results[4].what == "Took too long"
     assert isinstance(results[5], BrrpError)
     assert "ZeroDivisionError" in str(results[5])
+
+
+def promise(path: Path) -> None:
+    """What a process does when it ends by itself, as locks between processes do to be removed."""
+    Finalize(None, path.touch, exitpriority=0)
+
+
+def test_workers_with_nothing_to_do_end_by_themselves(tmp_path: Path) -> None:
+    paths = [tmp_path / "a", tmp_path / "b"]
+    assert len(list(run_tasks(promise, [(path,) for path in paths], 2, 60.0))) == 2
+    assert all(path.exists() for path in paths)
 
 
 def test_closing_early_leaves_no_process() -> None:

@@ -94,7 +94,7 @@ def test_what_is_fetched_is_what_auto_uses(
     mirror: str, meshes: Path, prior: Path, coloured_frame: Frame
 ) -> None:
     """From the network to the answer; at the end only the vision model is left."""
-    assert resolve_name("auto") == "fitness"
+    assert resolve_name("auto") == "appearance"
     done = fetch("--from", mirror)
     assert done.exit_code == 0, done.output
     assert "3 files fetched, 0 there already" in done.stdout and str(clip_cache()) in done.stdout
@@ -124,7 +124,7 @@ def test_8_bit_into_a_folder_of_ones_own(mirror: str, tmp_path: Path) -> None:
         "onnx/vision_model_quantized.onnx",
         "tokenizer.json",
     ]
-    assert resolve_name("auto") == "fitness"
+    assert resolve_name("auto") == "appearance"
     assert resolve_name("auto", tmp_path / "clip") == "clip"
 
 
@@ -145,7 +145,7 @@ def test_a_mirror_with_a_wrong_model_leaves_no_clip(published: Path, tmp_path: P
     assert done.exit_code == 1
     assert "not the one that was asked for" in done.stderr and "vision_model.onnx" in done.stderr
     assert left(clip_cache()) == ["onnx/text_model.onnx", "tokenizer.json"]
-    assert resolve_name("auto") == "fitness"
+    assert resolve_name("auto") == "appearance"
     assert fetch("--from", published).exit_code == 0
     assert resolve_name("auto") == "clip"
 

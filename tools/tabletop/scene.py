@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +15,7 @@ from brrp_cli.frames.noise import add_depth_noise
 from brrp_cli.frames.published import depth_from_buffer, intrinsics_from_projection
 from brrp_cli.seeds import child_rng
 from tabletop.check import CLEAN, STRUCTURED_LIGHT, Distance, check_scene
+from tabletop.light import draw_light, relight
 from tabletop.models import Model, load_model
 from tabletop.render import FAR, NEAR, NOTHING, Camera, Picture, draw_camera, draw_look, render
 from tabletop.settle import Pose, drop
@@ -22,12 +23,14 @@ from tabletop.settle import Pose, drop
 FEWEST, MOST = 3, 10
 MAX_DRAWS = 20
 LIMITS = {"none": CLEAN, "structured-light": STRUCTURED_LIGHT}
+LIGHTS = ("plain", "varied")
 JPEG_QUALITY = 95
 
 
 @dataclass(frozen=True)
 class Plan:
-    """What all scenes of a set share. `noise`: a key of `LIMITS`; `size`: (width, height)."""
+    """What all scenes of a set share. `noise`: a key of `LIMITS`; `light`: one of `LIGHTS`;
+    `size`: (width, height)."""
 
     meshes: tuple[Path, ...]
     data_root: Path
@@ -37,12 +40,14 @@ class Plan:
     noise: str
     size: tuple[int, int]
     overwrite: bool
+    light: str = "plain"
 
 
 def make_scene(plan: Plan, number: int, check: bool) -> list[Distance]:
     """Write scene `number`; it depends on the plan's meshes and seed and on the number alone.
 
-    Noise has random numbers of its own, so that the noisy set shows the scenes of the clean one.
+    Noise and light have random numbers of their own, so that a noisy or lit set shows the scenes of
+    the clean one.
 
     Errors: SceneError if the check fails or no draw leaves enough objects on the table.
     """
@@ -52,6 +57,10 @@ def make_scene(plan: Plan, number: int, check: bool) -> list[Distance]:
     centers = [pose.apply(model.center[None])[0] for pose, model in zip(poses, models, strict=True)]
     cameras = [draw_camera(np.mean(centers, axis=0), plan.size, rng) for _ in range(plan.views)]
     pictures = render(models, poses, look, cameras, plan.size)
+    if plan.light == "varied":
+        light_rng = child_rng(plan.seed, "scene", number, "light")
+        light = draw_light(light_rng)
+        pictures = [replace(p, rgb=relight(p.rgb, light, light_rng)) for p in pictures]
     folder = plan.output / f"{number:08d}"
     with atomic_folder(folder, overwrite=plan.overwrite, mark="objects.json") as partial:
         entries = [

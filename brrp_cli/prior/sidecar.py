@@ -1,0 +1,123 @@
+"""The appearance of all objects in one file, so that a lookup reads no shard.
+
+`appearance-KEY.npy` is a structured array, one row for each object in the order of their names. It
+holds nothing that the shards do not: where it is missing or damaged, it is made again from them, to
+the same bytes. NumPy maps it into memory, and only rows that are looked at are read.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import logging
+from collections.abc import Iterator, Sequence
+from itertools import groupby
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brrp_cli.appearance.colour import COLOUR_BINS
+from brrp_cli.appearance.descriptor import Appearance
+from brrp_cli.appearance.pairs import PAIR_BINS
+from brrp_cli.errors import OutputError, PriorError
+from brrp_cli.files import atomic_path, sha256_file
+from brrp_cli.prior.manifest import Manifest, ObjectEntry, ShardEntry
+from brrp_cli.prior.shard import damaged, open_shard, read_appearance
+
+log = logging.getLogger(__name__)
+
+
+def sidecar_file(objects: Sequence[ObjectEntry], parameters: dict[str, Any]) -> str:
+    """Name of the file, from all that decides its content."""
+    key = json.dumps([parameters, [[o.name, o.input_sha256] for o in objects]], sort_keys=True)
+    return f"appearance-{hashlib.sha256(key.encode()).hexdigest()[:16]}.npy"
+
+
+def write_sidecar(
+    folder: Path, objects: Sequence[ObjectEntry], parameters: dict[str, Any]
+) -> ShardEntry:
+    """Write the file of these objects, whole or not at all. Errors: PriorError, OutputError."""
+    file = sidecar_file(objects, parameters)
+    with atomic_path(folder / file) as partial:
+        table = np.lib.format.open_memmap(
+            partial, mode="w+", dtype=_row_type(parameters), shape=(len(objects),)
+        )
+        _fill(table, folder, objects)
+        table.flush()
+        del table
+    return ShardEntry(file, sha256_file(folder / file), (folder / file).stat().st_size)
+
+
+def is_whole(folder: Path, entry: ShardEntry) -> bool:
+    """Whether the file is there with the bytes that the manifest vouches for."""
+    path = folder / entry.file
+    return (
+        path.is_file() and path.stat().st_size == entry.bytes and sha256_file(path) == entry.sha256
+    )
+
+
+def read_sidecar(folder: Path, manifest: Manifest) -> NDArray[Any] | None:
+    """A row for each object: `colour` (v, COLOUR_BINS) and `pairs` (v, PAIR_BINS) uint8, `sizes`
+    (r, 3) float32, NaN where an object has fewer poses. None for a prior of an older brrp.
+
+    A file that is missing or damaged is made again; in memory, where the folder cannot be written.
+    Errors: PriorError if the shards have other descriptors than the manifest says.
+    """
+    entry = manifest.appearance
+    if entry is None:
+        return None
+    path = folder / entry.file
+    if not is_whole(folder, entry):
+        log.warning("%s is missing or damaged; it is made again from the shards", path)
+        try:
+            made = write_sidecar(folder, manifest.objects, manifest.parameters)
+        except OutputError:
+            table = np.zeros(len(manifest.objects), _row_type(manifest.parameters))
+            _fill(table, folder, manifest.objects)
+            return table
+        if made != entry:
+            raise damaged(path, "descriptors that are not those that the manifest vouches for")
+    try:
+        table = np.load(path, mmap_mode="r", allow_pickle=False)
+    except (OSError, ValueError) as error:
+        raise damaged(path, error) from error
+    if table.dtype != _row_type(manifest.parameters) or len(table) != len(manifest.objects):
+        raise damaged(path, f"{table.dtype}, {table.shape}")
+    return np.asanyarray(table)
+
+
+def _row_type(parameters: dict[str, Any]) -> np.dtype[Any]:
+    try:
+        views = int(parameters["appearance"]["views"])
+        poses = int(parameters["poses"]["max_count"])
+    except (KeyError, TypeError, ValueError) as error:
+        raise PriorError(
+            "The prior's manifest does not say how its objects were looked at",
+            found=repr(error),
+            fix="run brrp build-prior again",
+        ) from error
+    return np.dtype(
+        [
+            ("colour", "|u1", (views, COLOUR_BINS)),
+            ("pairs", "|u1", (views, PAIR_BINS)),
+            ("sizes", "<f4", (poses, 3)),
+        ]
+    )
+
+
+def _fill(table: NDArray[Any], folder: Path, objects: Sequence[ObjectEntry]) -> None:
+    for row, found in enumerate(_from_shards(folder, objects)):
+        table["colour"][row] = found.colour
+        table["pairs"][row] = found.pairs
+        table["sizes"][row] = np.nan
+        table["sizes"][row, : len(found.sizes)] = found.sizes
+
+
+def _from_shards(folder: Path, objects: Sequence[ObjectEntry]) -> Iterator[Appearance]:
+    """The descriptors of each object; a shard is opened once, since it holds a run of names."""
+    for file, members in groupby(objects, key=lambda entry: entry.shard):
+        with open_shard(folder / file) as shard:
+            for entry in members:
+                yield read_appearance(shard, entry.name)

@@ -1,0 +1,88 @@
+"""Retrieval by what objects look like: colour, shape and metric size, without a network.
+
+Stored objects were looked at from all around when the prior was built. What is seen of an object is
+compared with every stored view in many lights, and with the stored object's size in its resting
+poses. Probabilities need not sum to 1: the rest is the probability that the prior does not hold the
+object. The constants that turn likeness into probability are in belief.py.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brrp_cli.config import Config
+from brrp_cli.errors import RetrievalError
+from brrp_cli.frames.frame import BACKGROUND, Frame
+from brrp_cli.frames.observe import box_center
+from brrp_cli.frames.plane import Plane, fit_plane
+from brrp_cli.prior.store import Prior
+from brrp_cli.retrieval.belief import Evidence, believe
+from brrp_cli.retrieval.lights import lights, log_prior
+from brrp_cli.retrieval.likeness import evidence, lit_histograms
+from brrp_cli.retrieval.seen import see_object
+from brrp_cli.retrieval.shortlist import Shortlist
+
+
+class AppearanceRetriever:
+    """P(c|R) from colour, shape and size. Errors: RetrievalError if the prior has no descriptors.
+
+    The objects of a frame are judged together, since one light falls on all of them: the first
+    question about a frame costs as much as all of its objects, the others cost nothing.
+    """
+
+    name = "appearance"
+
+    def __init__(self, prior: Prior, config: Config, seed: int) -> None:
+        table = prior.appearance
+        if table is None:
+            raise RetrievalError(
+                "The prior does not know what its objects look like",
+                where=prior.path,
+                found="a prior that an older brrp built",
+                fix="run brrp build-prior MESHES --overwrite, or pass --retriever fitness",
+            )
+        self._table = table
+        self._shortlist = Shortlist(table)
+        self._config = config
+        self._seed = seed
+        self._gains = lights()
+        self._light = log_prior(self._gains)
+        self._frame: Frame | None = None
+        self._answers: dict[int, NDArray[np.float64]] = {}
+
+    def probabilities(self, frame: Frame, object_id: int) -> NDArray[np.float64]:
+        """P(c|R) (n,) for one object of the frame, in the order of the prior's names; sum <= 1."""
+        if frame is not self._frame:
+            found = self.evidence(frame)
+            answers = believe(list(found.values()), self._light, len(self._table))
+            self._answers = dict(zip(found, answers, strict=True))
+            self._frame = frame
+        if object_id not in self._answers:
+            raise RetrievalError(
+                "The mask has no such object",
+                where=frame.source,
+                expected=", ".join(map(str, frame.object_ids)) or "a mask with objects",
+                found=object_id,
+            )
+        return self._answers[object_id]
+
+    def evidence(self, frame: Frame) -> dict[int, Evidence]:
+        """How alike every object of the frame is to the stored ones, by id."""
+        plane = self._plane(frame)
+        found = {}
+        for object_id in frame.object_ids:
+            seen = see_object(frame, object_id, plane)
+            histograms = lit_histograms(seen, self._gains)
+            rows = self._shortlist.rows(seen, histograms)
+            found[object_id] = evidence(seen, histograms, self._table, rows, len(self._gains))
+        return found
+
+    def _plane(self, frame: Frame) -> Plane | None:
+        config = self._config.observation
+        points = [frame.object_points(i) for i in frame.object_ids]
+        centers = [box_center(p) for p in points if len(p) >= config.min_points]
+        if not centers:
+            return None
+        background = frame.points[frame.valid & (frame.segmap == BACKGROUND)]
+        return fit_plane(background, config, self._seed, np.mean(centers, axis=0))
