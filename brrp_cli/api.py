@@ -108,7 +108,8 @@ def reconstruct(
     reconstructed gets a status; the others still are. The frame is never changed. The same seed
     gives the same result.
 
-    Errors: BrrpError for an unknown method, or a prior or retriever that it lacks or cannot use.
+    Errors: BrrpError for an unknown method, or a prior or retriever that it lacks or cannot use;
+    PriorError for a shard that is damaged, when an object is read from it.
     """
     _check_method(method, prior, retriever)
     config = config or preset("default")
@@ -140,6 +141,9 @@ def reconstruct(
         try:
             result = one(scene.objects[object_id])
             _add_surface(result, config)
+        except PriorError:
+            # A damaged prior is no fault of the object that comes upon it.
+            raise
         except BrrpError as error:
             log.warning("Object %d: %s", object_id, error)
             result = ObjectReconstruction(object_id, FAILED, str(error))
