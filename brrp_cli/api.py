@@ -103,11 +103,13 @@ def reconstruct(
 
     method : "brrp", which needs a prior, or "vprism", which has none, runs on the CPU and takes
     the surface alone from `config`
-    retriever : P(c|R); without one, CLIP if `BRRP_CLIP_DIR` is set, else appearance, else (with a
-    prior of an older brrp) registration fitness. An object that cannot be reconstructed gets a
-    status; the others still are. The frame is never changed. The same seed gives the same result.
+    retriever : P(c|R); without one, CLIP if `BRRP_CLIP_DIR` is set or CLIP was fetched, else
+    appearance, else (with a prior of an older brrp) registration fitness. An object that cannot be
+    reconstructed gets a status; the others still are. The frame is never changed. The same seed
+    gives the same result.
 
-    Errors: BrrpError for an unknown method, or a prior or retriever that it lacks or cannot use.
+    Errors: BrrpError for an unknown method, or a prior or retriever that it lacks or cannot use;
+    PriorError for a shard that is damaged, when an object is read from it.
     """
     _check_method(method, prior, retriever)
     config = config or preset("default")
@@ -144,6 +146,9 @@ def reconstruct(
         try:
             result = one(scene.objects[object_id])
             _add_surface(result, config)
+        except PriorError:
+            # A damaged prior is no fault of the object that comes upon it.
+            raise
         except BrrpError as error:
             log.warning("Object %d: %s", object_id, error)
             result = ObjectReconstruction(object_id, FAILED, str(error))

@@ -18,6 +18,7 @@ COMMANDS = {
     "verify": ("verify", "Check every byte of a prior."),
     "frame": ("frame", "Turn colour and depth images into a frame; find the objects."),
     "reconstruct": ("reconstruct", "Turn a segmented RGBD frame into a closed mesh per object."),
+    "fetch": ("fetch", "Bring CLIP, which retrieves objects by their look."),
     "eval": ("eval", "Measure methods on scenes whose truth is known."),
     "demo": ("demo", "Run the whole path on a made scene and score it."),
 }

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import logging
 import sys
-from collections.abc import Iterable, Sized
+from collections.abc import Callable, Iterable, Iterator, Sized
+from contextlib import contextmanager
 from typing import TypeVar
 
 T = TypeVar("T")
@@ -34,3 +35,21 @@ def progress(items: Iterable[T], label: str, total: int | None = None) -> Iterab
         total = len(items)
     bar: Iterable[T] = tqdm(items, desc=label, total=total, file=sys.stderr)
     return bar
+
+
+@contextmanager
+def byte_bar(total: int, label: str) -> Iterator[Callable[[int], None]]:
+    """A bar on stderr, if that is a terminal, for `total` bytes; yields what moves it on."""
+    from tqdm import tqdm
+
+    disable = quiet() or not sys.stderr.isatty()
+    with tqdm(
+        total=total,
+        desc=label,
+        unit="B",
+        unit_scale=True,
+        unit_divisor=1000,
+        file=sys.stderr,
+        disable=disable,
+    ) as bar:
+        yield lambda count: bar.update(count) and None

@@ -5,6 +5,7 @@ import pytest
 from brrp_cli.errors import (
     BrrpError,
     DependencyError,
+    FetchError,
     FrameError,
     MeshError,
     OutputError,
@@ -18,6 +19,7 @@ KINDS = [
     MeshError,
     PriorError,
     RetrievalError,
+    FetchError,
     OutputError,
     DependencyError,
 ]

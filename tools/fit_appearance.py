@@ -1,7 +1,7 @@
 """Fit the constants of retrieval by appearance on made scenes, or report with those in the code.
 
-    python tools/fit_appearance.py --prior prior/ scenes/fit_prior scenes/fit_unseen scenes/fit_other
-    python tools/fit_appearance.py --prior prior/ --report scenes/test_prior ...
+    python tools/fit_appearance.py --prior prior/ fit_prior/ fit_unseen/ fit_other/
+    python tools/fit_appearance.py --prior prior/ --report test_prior/ test_unseen/ test_other/
 
 Scenes of objects that the prior holds and of others, made with `tools/make_scenes.py --noise
 structured-light --light varied`; every view counts. What is minimised is the mean of -ln P(what it

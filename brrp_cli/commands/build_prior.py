@@ -7,9 +7,11 @@ from pathlib import Path
 
 import click
 
+from brrp_cli.errors import BrrpError
 from brrp_cli.prior.locate import output_prior
 from brrp_cli.prior.parameters import UNITS, BuildParameters
 from brrp_cli.progress import note, quiet
+from brrp_cli.retrieval.clip_files import clip_folder
 
 
 @click.command("build-prior")
@@ -32,6 +34,11 @@ from brrp_cli.progress import note, quiet
 @click.option(
     "--workers", type=click.IntRange(1), help="Processes; as many as processors if not said."
 )
+@click.option(
+    "--clip-dir",
+    type=click.Path(path_type=Path),
+    help="Folder with CLIP, whose text embeddings are kept with the prior.",
+)
 @click.option("--overwrite", is_flag=True, help="Replace a prior that has other parameters.")
 def command(
     meshes: Path,
@@ -41,6 +48,7 @@ def command(
     samples: int,
     seed: int,
     workers: int | None,
+    clip_dir: Path | None,
     overwrite: bool,
 ) -> None:
     """Turn the meshes in the folder MESHES into a prior.
@@ -80,5 +88,23 @@ def command(
         f"{len(manifest.failed)} failed) in {len(manifest.shards)} shards, {size:.1f} MB, "
         f"written to {report.path}"
     )
+    _keep_descriptions(report.path, clip_dir)
     if manifest.failed:
         sys.exit(3)
+
+
+def _keep_descriptions(folder: Path, clip_dir: Path | None) -> None:
+    """Let CLIP read the descriptions now, where there is CLIP: later its vision model is enough."""
+    clip = clip_folder(clip_dir)
+    if clip is None:
+        return
+    from brrp_cli.prior.store import open_prior
+    from brrp_cli.retrieval.clip import keep_descriptions
+
+    try:
+        keep_descriptions(open_prior(folder), clip)
+    except BrrpError as error:
+        # The prior is there and whole; only who asked for CLIP has to know at once.
+        if clip_dir is not None:
+            raise
+        note(f"CLIP's text embeddings are not kept with the prior: {error.what}")

@@ -13,7 +13,8 @@ from brrp_cli.commands.retriever_option import RetrieverName
 from brrp_cli.config import PRESETS
 from brrp_cli.methods.registry import METHODS
 from brrp_cli.progress import note
-from brrp_cli.retrieval.choose import CLIP_DIR_VARIABLE, RETRIEVERS
+from brrp_cli.retrieval.choose import RETRIEVERS
+from brrp_cli.retrieval.clip_files import CLIP_DIR_VARIABLE
 
 SOME_FAILED = 3
 ABLATIONS = ("truth",)
@@ -85,7 +86,7 @@ def _selection(ctx: click.Context, option: click.Parameter, value: str | None) -
 @click.option(
     "--clip-dir",
     type=click.Path(path_type=Path),
-    help=f"Folder with CLIP ViT-B/16 as ONNX. [default: {CLIP_DIR_VARIABLE}]",
+    help=f"Folder with CLIP ViT-B/16 as ONNX. [default: {CLIP_DIR_VARIABLE}, else the fetched]",
 )
 @click.option(
     "--shift-masks",

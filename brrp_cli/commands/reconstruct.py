@@ -14,7 +14,8 @@ from brrp_cli.commands.retriever_option import RetrieverName
 from brrp_cli.config import PRESETS, preset
 from brrp_cli.methods.registry import METHODS
 from brrp_cli.progress import note
-from brrp_cli.retrieval.choose import CLIP_DIR_VARIABLE, RETRIEVERS, choose_retriever
+from brrp_cli.retrieval.choose import RETRIEVERS, choose_retriever
+from brrp_cli.retrieval.clip_files import CLIP_DIR_VARIABLE
 
 if TYPE_CHECKING:
     from brrp_cli.api import Reconstruction
@@ -50,7 +51,7 @@ OF_A_PRIOR = ("prior_path", "preset_name", "k", "retriever", "clip_dir")
 @click.option(
     "--clip-dir",
     type=click.Path(path_type=Path),
-    help=f"Folder with CLIP ViT-B/16 as ONNX. [default: {CLIP_DIR_VARIABLE}]",
+    help=f"Folder with CLIP ViT-B/16 as ONNX. [default: {CLIP_DIR_VARIABLE}, else the fetched]",
 )
 @click.option("--frame", "coordinates", type=click.Choice(["camera", "world"]), default="camera")
 @click.option("--depth-scale", type=float, help="Raw depth times this is metres.")

@@ -31,8 +31,8 @@ from brrp_cli.files import sha256_file, write_bytes
 from brrp_cli.methods.registry import METHODS
 from brrp_cli.prior.store import Prior
 from brrp_cli.progress import progress
-from brrp_cli.retrieval.choose import USE_CLIP, clip_folder, need_clip_folder, resolve_name
-from brrp_cli.retrieval.clip_files import find_clip_files
+from brrp_cli.retrieval.choose import USE_CLIP, resolve_name
+from brrp_cli.retrieval.clip_files import clip_folder, need_clip_folder
 from brrp_cli.version import __version__
 
 
@@ -86,8 +86,7 @@ def evaluate(request: Request, say: Callable[[str], None] = lambda text: None) -
         request.shifts,
     )
     if any(variant.retriever in USE_CLIP for variant in variants):
-        # A missing model is told now, not in every row.
-        find_clip_files(need_clip_folder(request.clip_dir))
+        _prepare_clip(opened, need_clip_folder(request.clip_dir))
     parameters = _parameters(request, scenes, variants, prior)
     workers = request.workers or len(os.sched_getaffinity(0))
     labels = short_labels(variants)
@@ -169,6 +168,15 @@ def _prior(request: Request) -> Prior | None:
         return None
     path, _ = locate_prior(request.prior)
     return open_prior(path)
+
+
+def _prepare_clip(prior: Prior | None, folder: Path) -> None:
+    """Embed the descriptions once, so that no worker has to; a missing model is told now, not in
+    every row."""
+    from brrp_cli.retrieval.clip import keep_descriptions
+
+    assert prior is not None
+    keep_descriptions(prior, folder)
 
 
 def _parameters(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import lzma
 import math
+import tokenize
 import zipfile
 import zlib
 from collections.abc import Iterator, Mapping
@@ -28,6 +29,8 @@ _DAMAGE = (
     ValueError,
     NotImplementedError,  # a compression that Python does not know
     RuntimeError,  # an encrypted archive
+    SyntaxError,  # a header that NumPy takes for one that Python 2 wrote
+    tokenize.TokenError,
 )
 
 

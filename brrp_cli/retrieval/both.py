@@ -12,8 +12,9 @@ from brrp_cli.retrieval.base import Retriever, unknown
 class BothRetriever:
     """P(c|R) ~ product of two retrievers' probabilities.
 
-    What the second one says of objects that are not in the prior is kept. Where no object is
-    possible for both, the second one's answer stands.
+    Of the first one only the ratios between objects count: CLIP's share for what is not in the
+    prior was not fitted, so that the second one's is kept. Where no object is possible for both,
+    the second one's answer stands.
     """
 
     name = "both"

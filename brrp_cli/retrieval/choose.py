@@ -2,39 +2,20 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from brrp_cli.config import Config
 from brrp_cli.errors import RetrievalError
+from brrp_cli.retrieval.clip_files import clip_folder, need_clip_folder
 
 if TYPE_CHECKING:
     from brrp_cli.prior.store import Prior
     from brrp_cli.retrieval.base import Retriever
 
-CLIP_DIR_VARIABLE = "BRRP_CLIP_DIR"
 # In place of a name, a file with probabilities may stand.
 RETRIEVERS = ("auto", "clip", "appearance", "both", "fitness", "uniform")
 USE_CLIP = ("clip", "both")
-
-
-def clip_folder(clip_dir: Path | None) -> Path | None:
-    """The folder with CLIP: the one given, else the one that BRRP_CLIP_DIR names."""
-    named = os.environ.get(CLIP_DIR_VARIABLE)
-    return clip_dir or (Path(named) if named else None)
-
-
-def need_clip_folder(clip_dir: Path | None) -> Path:
-    """`clip_folder`, or a RetrievalError that says how to name one."""
-    folder = clip_folder(clip_dir)
-    if folder is None:
-        raise RetrievalError(
-            "CLIP needs its model",
-            expected="a folder with CLIP ViT-B/16 as ONNX",
-            fix=f"pass --clip-dir FOLDER or set {CLIP_DIR_VARIABLE}",
-        )
-    return folder
 
 
 def resolve_name(name: str, clip_dir: Path | None = None, prior: Prior | None = None) -> str:
@@ -51,10 +32,10 @@ def choose_retriever(
 ) -> Retriever:
     """The retriever of that name, or the one that reads the file of that name.
 
-    `auto` is CLIP where a folder with it is named, else appearance where the prior knows it, else
-    fitness.
+    `auto` is CLIP where there is one, else appearance where the prior knows it, else fitness.
 
-    clip_dir : folder with CLIP as ONNX; without it, the one that BRRP_CLIP_DIR names.
+    clip_dir : folder with CLIP as ONNX; without it, the one that BRRP_CLIP_DIR names, else the one
+    that `brrp fetch clip` filled. Errors: RetrievalError.
     """
     name = resolve_name(name, clip_dir, prior)
     if name == "both":
@@ -81,10 +62,9 @@ def _one(name: str, prior: Prior, config: Config, seed: int, clip_dir: Path | No
 
         return UniformRetriever(prior.names)
     if name == "clip":
-        from brrp_cli.retrieval.clip import ClipRetriever
+        from brrp_cli.retrieval.clip import clip_retriever
 
-        folder = need_clip_folder(clip_dir)
-        return ClipRetriever(folder, [prior.descriptions[name] for name in prior.names])
+        return clip_retriever(prior, need_clip_folder(clip_dir))
     if Path(name).is_file():
         from brrp_cli.retrieval.table import TableRetriever
 

@@ -1,4 +1,4 @@
-"""Where the files of CLIP ViT-B/16 lie: a folder that the user names, in a published layout."""
+"""Where the files of CLIP ViT-B/16 lie: a folder in a published layout, named or fetched."""
 
 from __future__ import annotations
 
@@ -35,12 +35,44 @@ LAYOUTS: dict[str, dict[str, tuple[str, ...]]] = {
 }
 
 
-def clip_folder(named: Path | None) -> Path | None:
-    """The folder that was named, else the one in BRRP_CLIP_DIR, else None: there is no CLIP."""
-    if named is not None:
-        return named
+def clip_cache() -> Path:
+    """Where `brrp fetch clip` puts CLIP when nobody says."""
+    import platformdirs
+
+    return Path(platformdirs.user_cache_dir("brrp")) / "clip"
+
+
+def named_clip_folder(named: Path | None) -> Path | None:
+    """The folder that was named, else the one in BRRP_CLIP_DIR, else None."""
     variable = os.environ.get(CLIP_DIR_VARIABLE)
-    return Path(variable) if variable else None
+    return named or (Path(variable) if variable else None)
+
+
+def clip_folder(named: Path | None) -> Path | None:
+    """The folder with CLIP: the one named, else that of the user's cache if CLIP was fetched into
+    it, else None: there is no CLIP."""
+    # The vision model is fetched last, and no file has its name before it has been checked.
+    fetched = clip_cache() if "vision" in find_clip_parts(clip_cache()) else None
+    return named_clip_folder(named) or fetched
+
+
+def need_clip_folder(named: Path | None) -> Path:
+    """`clip_folder`, or a RetrievalError that says how to come by one."""
+    folder = clip_folder(named)
+    if folder is None:
+        raise RetrievalError(
+            "CLIP needs its model",
+            expected="a folder with CLIP ViT-B/16 as ONNX",
+            fix="fetch it once: brrp fetch clip; or name a folder that has it with --clip-dir or "
+            f"{CLIP_DIR_VARIABLE}",
+        )
+    return folder
+
+
+def find_clip_parts(folder: Path) -> dict[str, Path]:
+    """Those of `text`, `vision` and `tokenizer` that lie in `folder`, in the layout of which most
+    is there."""
+    return _best_layout(folder)[1]
 
 
 def find_clip_files(folder: Path) -> ClipFiles:
@@ -50,12 +82,9 @@ def find_clip_files(folder: Path) -> ClipFiles:
             "There is no such CLIP folder",
             where=folder,
             expected=_layouts(),
-            fix=f"name the folder with --clip-dir or {CLIP_DIR_VARIABLE}",
+            fix=f"name the folder with --clip-dir or {CLIP_DIR_VARIABLE}, or run brrp fetch clip",
         )
-    present = {name: _present(folder, layout) for name, layout in LAYOUTS.items()}
-    # The layout of which most is there is the one the user means.
-    name = max(present, key=lambda layout: len(present[layout]))
-    found = present[name]
+    name, found = _best_layout(folder)
     missing = [" or ".join(LAYOUTS[name][part]) for part in LAYOUTS[name] if part not in found]
     if not missing:
         return ClipFiles(**found)
@@ -65,15 +94,23 @@ def find_clip_files(folder: Path) -> ClipFiles:
             where=folder,
             expected=_layouts(),
             found=_listing(folder),
-            fix="download either repository from huggingface.co and name its folder",
+            fix=f"brrp fetch clip --clip-dir {folder}",
         )
     raise RetrievalError(
         "The CLIP folder is not complete",
         where=folder,
         expected="; ".join(missing),
         found=", ".join(str(path.relative_to(folder)) for path in found.values()),
-        fix=f"download what is missing from huggingface.co/{name} (all from one repository)",
+        fix=f"bring what is missing from huggingface.co/{name} (all from one repository); "
+        f"brrp fetch clip --clip-dir {folder} brings all of {next(iter(LAYOUTS))}",
     )
+
+
+def _best_layout(folder: Path) -> tuple[str, dict[str, Path]]:
+    present = {name: _present(folder, layout) for name, layout in LAYOUTS.items()}
+    # The layout of which most is there is the one the user means.
+    name = max(present, key=lambda layout: len(present[layout]))
+    return name, present[name]
 
 
 def _present(folder: Path, layout: dict[str, tuple[str, ...]]) -> dict[str, Path]:

@@ -17,6 +17,10 @@ CONTEXT = 77
 # What stands after the end token cannot be seen by it (causal attention), so any id would do.
 PADDING = 0
 
+# What tells CLIP's own vocabulary and merges from others that have its special tokens.
+GOLDEN_TEXT = "a photo of a cat"
+GOLDEN = [START, 320, 1125, 539, 320, 2368, END]
+
 _ARTICLES = ("a", "an", "the")
 
 
@@ -51,6 +55,9 @@ class ClipTokenizer:
         # Start, end, length and padding are set here and not left to what the file says.
         self._tokenizer.no_truncation()
         self._tokenizer.no_padding()
+        tokens = self([GOLDEN_TEXT])[0].tolist()
+        if tokens != GOLDEN:
+            raise _not_clip(path, found=tokens)
 
     def __call__(self, texts: Sequence[str], length: int | None = None) -> NDArray[np.int64]:
         """Token ids (n, S): start, words, end, padding.
@@ -71,7 +78,8 @@ def _not_clip(path: Path, found: object) -> RetrievalError:
     return RetrievalError(
         "This is not CLIP's tokenizer",
         where=path,
-        expected=f"a tokenizer.json with {START_TEXT} = {START} and {END_TEXT} = {END}",
+        expected=f"a tokenizer.json with {START_TEXT} = {START} and {END_TEXT} = {END}, by which "
+        f'"{GOLDEN_TEXT}" is {GOLDEN}',
         found=found,
         fix="take tokenizer.json from the repository that the models came from",
     )

@@ -179,6 +179,7 @@ def test_bare_the_report_lies_beside_the_scenes_and_shifts_are_compared(place):
         (("--data-root", "/nowhere"), "No such data folder"),
         (("--method", "magic"), "magic"),
         (("--retriever", "clip", "--method", "brrp", "--prior", "PRIOR"), "CLIP needs its model"),
+        (("--retriever", "both", "--method", "brrp", "--prior", "PRIOR"), "CLIP needs its model"),
         (("--scenes", "5:9"), "The selection holds no scene"),
         (("--scenes", "5"), "is not A:B"),
     ],

@@ -2,7 +2,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from small_clip import RGB, write_immich, write_xenova
+from small_clip import RGB, write_immich, write_manifest, write_xenova
 
 from brrp_cli.frames.frame import Frame
 
@@ -15,6 +15,21 @@ def xenova(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="session")
 def immich(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return write_immich(tmp_path_factory.mktemp("immich"))
+
+
+@pytest.fixture(scope="session")
+def published(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A repository in the Xenova layout with both precisions, which differ in gain only."""
+    folder = write_xenova(tmp_path_factory.mktemp("published"))
+    return write_xenova(folder, suffix="_quantized", text_gain=2, gain=0.5)
+
+
+@pytest.fixture
+def manifest(published: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The package's manifest names the models of `published` instead of those of the hub."""
+    path = write_manifest(tmp_path / "clip.toml", published)
+    monkeypatch.setattr("brrp_cli.retrieval.clip_manifest.MANIFEST", path)
+    return path
 
 
 @pytest.fixture

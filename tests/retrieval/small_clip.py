@@ -1,11 +1,13 @@
 """Small CLIPs of both published interfaces: colours are all that they know of the world.
 
-The text model sums a vector for each of the words red, green and blue; the vision model takes the
-mean pixel. Both map (red, green, blue) to 512 numbers by one matrix with orthonormal rows.
+The text model sums a vector for each of the words red, green, blue, and object, which is white;
+the vision model takes the mean pixel. Both map (red, green, blue) to 512 numbers by one matrix
+with orthonormal rows.
 """
 
 from __future__ import annotations
 
+import hashlib
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +19,7 @@ from tokenizers import Regex, Tokenizer, models, normalizers, pre_tokenizers
 WORDS = {"photo": 1125, "of": 539, "cat": 2368}
 # Green before red: as a merge of its own, "re" would otherwise split "green".
 COLOURS = {"green": 40002, "red": 40001, "blue": 40003}
+OBJECT = {"object": 40004}
 RGB = {"red": (255, 0, 0), "green": (0, 255, 0), "blue": (0, 0, 255)}
 
 
@@ -31,7 +34,7 @@ def write_tokenizer(path: Path, start: int = 49406, end: int = 49407) -> None:
     vocabulary |= {"<|startoftext|>": start, "<|endoftext|>": end}
     merges: list[tuple[str, str]] = []
     part_id = 45000
-    for word, word_id in {**WORDS, **COLOURS}.items():
+    for word, word_id in {**WORDS, **COLOURS, **OBJECT}.items():
         left = word[0]
         for i, letter in enumerate(word[1:], start=1):
             last = i == len(word) - 1
@@ -85,6 +88,7 @@ def write_model(
         table = np.zeros((49408, 3), dtype=np.float32)
         for column, word in enumerate(RGB):
             table[COLOURS[word], column] = 1
+        table[OBJECT["object"]] = 1
         constants |= {"table": table, "axes": np.array([1])}
         nodes = [
             helper.make_node("Gather", ["table", name], ["words"]),
@@ -109,7 +113,7 @@ def write_model(
     onnx.save(model, str(path))
 
 
-def write_xenova(folder: Path, suffix: str = "", **vision: float) -> Path:
+def write_xenova(folder: Path, suffix: str = "", *, text_gain: float = 7, **vision: float) -> Path:
     """Dynamic batch, int64, not normalised."""
     write_model(
         folder / f"onnx/text_model{suffix}.onnx",
@@ -118,7 +122,7 @@ def write_xenova(folder: Path, suffix: str = "", **vision: float) -> Path:
         shape=["batch", "sequence"],
         output="text_embeds",
         dtype=TensorProto.INT64,
-        gain=7,
+        gain=text_gain,
     )
     write_model(
         folder / f"onnx/vision_model{suffix}.onnx",
@@ -131,6 +135,24 @@ def write_xenova(folder: Path, suffix: str = "", **vision: float) -> Path:
     )
     write_tokenizer(folder / "tokenizer.json")
     return folder
+
+
+def write_manifest(path: Path, folder: Path) -> Path:
+    """A `clip.toml` for the Xenova layout in `folder`, which holds both precisions."""
+    lines = ['address = "http://nowhere.invalid"']
+    for name, part, precision in (
+        ("onnx/text_model.onnx", "text", "full"),
+        ("onnx/text_model_quantized.onnx", "text", "8bit"),
+        ("tokenizer.json", "tokenizer", None),
+        ("onnx/vision_model.onnx", "vision", "full"),
+        ("onnx/vision_model_quantized.onnx", "vision", "8bit"),
+    ):
+        data = (folder / name).read_bytes()
+        lines += ["[[files]]", f'path = "{name}"', f'part = "{part}"', f"bytes = {len(data)}"]
+        lines += [f'sha256 = "{hashlib.sha256(data).hexdigest()}"']
+        lines += [f'precision = "{precision}"'] if precision else []
+    path.write_text("\n".join(lines) + "\n")
+    return path
 
 
 def write_immich(folder: Path) -> Path:

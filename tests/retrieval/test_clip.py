@@ -22,7 +22,7 @@ def test_colours_find_their_prompt(
     clip = ClipRetriever(request.getfixturevalue(layout), DESCRIPTIONS)
     for object_id, best in {7: "red", 250: "green", 3: "blue"}.items():
         probabilities = clip.probabilities(coloured_frame, object_id)
-        assert probabilities.sum() == pytest.approx(1)
+        assert 0.99 < probabilities.sum() <= 1
         assert top_k(probabilities, ["blue", "green", "red"], 1)[0][0] == best
 
 
@@ -30,15 +30,26 @@ def test_colours_find_their_prompt(
 def test_probability_is_softmax_of_100_times_the_cosine(
     layout: str, request: pytest.FixtureRequest
 ) -> None:
-    """A crop whose pixels lie almost between two colours, so that no probability is 0 or 1."""
-    rgb = np.full((30, 30, 3), (142, 136, 60), dtype=np.uint8)
+    """A crop whose pixels lie almost between two colours and white, which is what "a photo of an
+    object" means to the small model: no probability is 0 or 1, and they do not sum to 1."""
+    rgb = np.full((30, 30, 3), (226, 90, 210), dtype=np.uint8)
     frame = Frame(rgb, np.ones((30, 30, 3), np.float32), np.ones((30, 30), np.int64), np.eye(3))
     clip = ClipRetriever(request.getfixturevalue(layout), ["blue", "green", "red"])
     pixel = ((rgb[0, 0] / 255 - MEAN) / STD)[::-1]
-    scores = np.exp(100 * pixel / np.linalg.norm(pixel))
-    expected = scores / scores.sum()
-    assert 0.01 < expected.max() < 0.99
-    assert clip.probabilities(frame, 1) == pytest.approx(expected, abs=1e-3)
+    cosines = np.append(pixel, pixel.sum() / np.sqrt(3)) / np.linalg.norm(pixel)
+    expected = np.exp(100 * cosines) / np.exp(100 * cosines).sum()
+    assert 0.3 < expected[3] < 0.4
+    assert clip.probabilities(frame, 1) == pytest.approx(expected[:3], abs=1e-3)
+
+
+def test_what_no_description_fits_is_not_in_the_prior(xenova: Path, coloured_frame: Frame) -> None:
+    """White is what the small model takes "an object" for."""
+    rgb = coloured_frame.rgb.copy()
+    rgb[coloured_frame.segmap == 7] = 255
+    frame = Frame(rgb, coloured_frame.points, coloured_frame.segmap, coloured_frame.K)
+    clip = ClipRetriever(xenova, DESCRIPTIONS)
+    assert clip.probabilities(frame, 7).sum() < 0.01
+    assert clip.probabilities(frame, 250).sum() > 0.99
 
 
 def test_more_objects_than_one_batch_keep_their_order(xenova: Path, coloured_frame: Frame) -> None:

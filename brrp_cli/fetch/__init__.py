@@ -1,0 +1,1 @@
+"""Files from elsewhere: brought whole, checked, or not at all."""

@@ -1,0 +1,10 @@
+import pytest
+
+
+@pytest.fixture(scope="session", autouse=True)
+def no_clip_of_the_users(tmp_path_factory: pytest.TempPathFactory):
+    """`auto` means no CLIP on any machine, whatever was fetched or named there."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("XDG_CACHE_HOME", str(tmp_path_factory.mktemp("cache")))
+        patch.delenv("BRRP_CLIP_DIR", raising=False)
+        yield
