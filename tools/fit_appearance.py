@@ -1,7 +1,7 @@
 """Fit the constants of retrieval by appearance on made scenes, or report with those in the code.
 
-    python tools/fit_appearance.py --prior prior/ scenes/fit_prior scenes/fit_unseen scenes/fit_other
-    python tools/fit_appearance.py --prior prior/ --report scenes/test_prior ...
+    python tools/fit_appearance.py --prior prior/ fit_prior/ fit_unseen/ fit_other/
+    python tools/fit_appearance.py --prior prior/ --report test_prior/ test_unseen/ test_other/
 
 Scenes of objects that the prior holds and of others, made with `tools/make_scenes.py --noise
 structured-light --light varied`; every view counts. What is minimised is the mean of -ln P(what it
@@ -31,7 +31,7 @@ from brrp_cli.progress import progress
 from brrp_cli.retrieval.appearance import AppearanceRetriever
 from brrp_cli.retrieval.base import unknown
 from brrp_cli.retrieval.belief import WEIGHTS, Evidence, Weights, believe
-from brrp_cli.retrieval.lights import lights, log_prior
+from brrp_cli.retrieval.lights import lights, local_lights, log_prior
 
 LARGE = 500  # visible pixels
 
@@ -102,14 +102,14 @@ def answers(
     views: Sequence[View], weights: Weights, count: int
 ) -> list[tuple[int, int, NDArray[np.float64]]]:
     """(true row, pixels, P(c|R)) of every object."""
-    light = log_prior(lights())
+    light, local = log_prior(lights()), local_lights(lights())
     return [
         (truth, pixels, probabilities)
         for view in views
         for truth, pixels, probabilities in zip(
             view.truth,
             view.pixels,
-            believe(view.evidence, light, count, weights),
+            believe(view.evidence, light, local, count, weights),
             strict=True,
         )
     ]

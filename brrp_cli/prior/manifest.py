@@ -3,8 +3,8 @@
 Keys: kind, schema, parameters, objects (sorted by name; each with name, description, source,
 input_sha256, shard, half_extent, record), shards (file, sha256, bytes), appearance (file, sha256,
 bytes; see sidecar.py), failed (name, source, reason), libraries (versions that the objects were
-made with). Schema 1 had no appearance. No times and no absolute paths: the same seed and meshes give
-the same bytes.
+made with). Schema 1 had no appearance. No times and no absolute paths: the same seed and meshes
+give the same bytes.
 """
 
 from __future__ import annotations
