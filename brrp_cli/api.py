@@ -128,6 +128,9 @@ def reconstruct(
         try:
             result = one(scene.objects[object_id])
             _add_surface(result, config)
+        except PriorError:
+            # Not the object's fault: the next one would only fail in its turn.
+            raise
         except BrrpError as error:
             log.warning("Object %d: %s", object_id, error)
             result = ObjectReconstruction(object_id, FAILED, str(error))

@@ -34,7 +34,7 @@ PROBABILITIES: list[Column] = [
 PLACEMENT: list[Column] = [
     ("true object first", "true_first", 1, 2),
     ("among the first 3", "true_in_3", 1, 2),
-    ("first 10", "true_in_10", 1, 2),
+    ("among the first 10", "true_in_10", 1, 2),
     ("P(true object)", "true_probability", 1, 2),
     ("ECE of P(c\\|R)", "ece_retrieval", 1, 3),
     ("P(not in prior), of those in it", "absent_inside", 1, 2),
