@@ -70,7 +70,7 @@ class AppearanceRetriever:
 
     def evidence(self, frame: Frame) -> dict[int, Evidence]:
         """How alike every object of the frame is to the stored ones, by id."""
-        plane = self._plane(frame)
+        plane = self.plane(frame)
         found = {}
         for object_id in frame.object_ids:
             seen = see_object(frame, object_id, plane)
@@ -79,7 +79,8 @@ class AppearanceRetriever:
             found[object_id] = evidence(seen, histograms, self._table, rows, len(self._gains))
         return found
 
-    def _plane(self, frame: Frame) -> Plane | None:
+    def plane(self, frame: Frame) -> Plane | None:
+        """The support plane of the frame; None where none is found."""
         config = self._config.observation
         points = [frame.object_points(i) for i in frame.object_ids]
         centers = [box_center(p) for p in points if len(p) >= config.min_points]
