@@ -25,13 +25,14 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from brrp_cli.config import preset
 from brrp_cli.errors import BrrpError
+from brrp_cli.evaluation.calibration import expected_calibration_error
 from brrp_cli.evaluation.scenes import find_scenes
 from brrp_cli.prior.store import Prior, open_prior
 from brrp_cli.progress import progress
 from brrp_cli.retrieval.appearance import AppearanceRetriever
 from brrp_cli.retrieval.base import unknown
 from brrp_cli.retrieval.belief import WEIGHTS, Evidence, Weights, believe
-from brrp_cli.retrieval.lights import lights, log_prior
+from brrp_cli.retrieval.lights import lights, local_lights, log_prior
 
 LARGE = 500  # visible pixels
 
@@ -57,12 +58,14 @@ def main(prior_path: Path, report: bool, sets: tuple[Path, ...]) -> None:
         views = [view for folder in sets for view in look(prior, folder)]
     except BrrpError as error:
         raise click.ClickException(str(error)) from error
-    weights = WEIGHTS if report else fit(views, len(prior.names))
-    click.echo(f"{weights}, mean loss {loss(views, weights, len(prior.names)):.4f}")
+    count = len(prior.names)
+    weights = WEIGHTS if report else fit(views, count)
+    click.echo(f"{weights}, mean loss {loss(views, weights, count):.4f}")
+    click.echo(f"calibration error over all of them {calibration(views, weights, count):.3f}")
     for folder in sets:
         members = [view for view in views if view.group == folder.name]
         for large in (True, False):
-            click.echo(line(folder.name, members, weights, len(prior.names), large))
+            click.echo(line(folder.name, members, weights, count, large))
 
 
 def look(prior: Prior, folder: Path) -> list[View]:
@@ -102,14 +105,14 @@ def answers(
     views: Sequence[View], weights: Weights, count: int
 ) -> list[tuple[int, int, NDArray[np.float64]]]:
     """(true row, pixels, P(c|R)) of every object."""
-    light = log_prior(lights())
+    light, local = log_prior(lights()), local_lights(lights())
     return [
         (truth, pixels, probabilities)
         for view in views
         for truth, pixels, probabilities in zip(
             view.truth,
             view.pixels,
-            believe(view.evidence, light, count, weights),
+            believe(view.evidence, light, local, count, weights),
             strict=True,
         )
     ]
@@ -122,6 +125,16 @@ def loss(views: Sequence[View], weights: Weights, count: int) -> float:
         for truth, _, p in answers(views, weights, count)
     ]
     return float(-np.mean(np.log(found)))
+
+
+def calibration(views: Sequence[View], weights: Weights, count: int) -> float:
+    """Expected calibration error of the most probable of the prior's objects and of none."""
+    sure, right = [], []
+    for truth, _, p in answers(views, weights, count):
+        best = -1 if unknown(p) > p.max() else int(p.argmax())
+        sure.append(unknown(p) if best < 0 else float(p[best]))
+        right.append(best == truth)
+    return expected_calibration_error(np.array(sure), np.array(right))
 
 
 def line(name: str, views: Sequence[View], weights: Weights, count: int, large: bool) -> str:

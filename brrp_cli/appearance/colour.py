@@ -15,7 +15,7 @@ COLOUR_BINS = L_BINS * AB_BINS**2
 AB_RANGE = 90.0
 AB_KNEE = 15.0
 # Colours are rounded to this many levels of each channel before anything is computed of them.
-_LEVELS = 32
+_LEVELS = 16
 
 _XYZ = np.array([[0.4124, 0.3576, 0.1805], [0.2126, 0.7152, 0.0722], [0.0193, 0.1192, 0.9505]])
 _WHITE = np.array([0.9505, 1.0, 1.089])

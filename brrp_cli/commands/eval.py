@@ -160,9 +160,12 @@ def command(
     result = evaluate(request, say=note)
     for summary in result.summaries:
         iou, chamfer = summary.figures["iou"], summary.figures["chamfer"]
+        figures = f"IoU {iou.value:.3f}  Chamfer {chamfer.value * 100:.2f} cm"
+        if summary.variant.method == "retrieval":
+            first, in_3 = summary.figures["true_first"], summary.figures["true_in_3"]
+            figures = f"true object first {first.value:.3f}, among 3 {in_3.value:.3f}"
         click.echo(
-            f"  {result.labels[summary.variant]:<24} IoU {iou.value:.3f}  "
-            f"Chamfer {chamfer.value * 100:.2f} cm  {summary.objects} objects, "
+            f"  {result.labels[summary.variant]:<24} {figures}  {summary.objects} objects, "
             f"{summary.failed} failed, {summary.empty} empty"
         )
     click.echo(f"Wrote {request.output}/ ({', '.join(result.files)})")

@@ -193,8 +193,8 @@ def _retrieval(
     answer = retriever.answers.get(item.object_id)
     if answer is not None:
         row["not_in_prior"] = unknown(answer)
-    if item.retrieved:
-        row |= {"best": item.retrieved[0].name, "best_probability": item.retrieved[0].probability}
+        best = int(np.argmax(answer))
+        row |= {"best": names[best], "best_probability": float(answer[best])}
     if true_name in names and answer is not None:
         mine = float(answer[names.index(true_name)])
         row |= {"true_rank": 1 + int(np.sum(answer > mine)), "true_probability": mine}

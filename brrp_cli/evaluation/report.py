@@ -34,7 +34,11 @@ PROBABILITIES: list[Column] = [
 PLACEMENT: list[Column] = [
     ("true object first", "true_first", 1, 2),
     ("among the first 3", "true_in_3", 1, 2),
+    ("among the first 10", "true_in_10", 1, 2),
     ("P(true object)", "true_probability", 1, 2),
+    ("ECE of P(c\\|R)", "ece_retrieval", 1, 3),
+    ("P(not in prior), of those in it", "absent_inside", 1, 2),
+    ("of those not in it", "absent_outside", 1, 2),
     ("placed model to true surface, cm", "placement_error", 100, 2),
 ]
 
@@ -87,6 +91,7 @@ def write_report(
     with_prior = [s for s in summaries if s.variant.preset is not None]
     if with_prior:
         parts += ["## Retrieval and registration", _figures_table(with_prior, labels, PLACEMENT)]
+        parts += ["Objects of the prior, by visible pixels:", _hits_table(with_prior, labels)]
     parts += ["## Time and memory", _cost_table(summaries, labels), "## Plots"]
     parts += [f"![{path.stem}]({path.parent.name}/{path.name})" for path in plots]
     parts += ["## Notes", NOTES.format(rounds=record["bootstrap_rounds"])]
@@ -125,6 +130,21 @@ def _figures_table(
     ]
     headings = ["", *(heading for heading, *_ in columns), "objects", "failed", "empty"]
     return table(headings, rows)
+
+
+def _hits_table(summaries: Sequence[VariantSummary], labels: Labels) -> str:
+    rows = [
+        [
+            labels[s.variant],
+            f"over {h.above:g}" + ("" if math.isinf(h.most) else f" to {h.most:g}"),
+            *(f"{share:.3f}" for share in (h.first, h.in_3, h.in_10)),
+            str(h.count),
+        ]
+        for s in summaries
+        for h in s.hits
+        if h.count
+    ]
+    return table(["", "visible pixels", "first", "among 3", "among 10", "objects"], rows)
 
 
 def _paper_table() -> str:

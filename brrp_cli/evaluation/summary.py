@@ -4,20 +4,34 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from brrp_cli.evaluation.bootstrap import Interval, calibration_interval, mean_interval
+from brrp_cli.evaluation.retrieval import (
+    Hits,
+    hits_by_pixels,
+    retrieval_calibration,
+    with_places,
+)
 from brrp_cli.evaluation.rows import METRICS, STAGES, Row, variant_of
 from brrp_cli.evaluation.score_object import REGIONS
 from brrp_cli.evaluation.variants import Variant
 from brrp_cli.methods.base import FAILED, TOO_FEW_POINTS
 from brrp_cli.seeds import child_rng
 
-RETRIEVAL = ("true_first", "true_in_3", "true_probability", "placement_error")
+RETRIEVAL = (
+    "true_first",
+    "true_in_3",
+    "true_in_10",
+    "true_probability",
+    "absent_inside",
+    "absent_outside",
+    "placement_error",
+)
 
 
 @dataclass(frozen=True)
@@ -31,6 +45,7 @@ class VariantSummary:
     figures : metric -> mean and interval, the set's expected calibration errors included
     seconds : stage -> mean over objects; peak_memory_mb : largest
     diagrams : region -> reliability sums (3, bins) of the set
+    hits : how often retrieval finds the true object, by visible pixels
     """
 
     variant: Variant
@@ -41,6 +56,7 @@ class VariantSummary:
     seconds: dict[str, float]
     peak_memory_mb: float
     diagrams: dict[str, NDArray[np.float64]]
+    hits: list[Hits] = field(default_factory=list)
 
 
 def summarise(rows: Sequence[Row], variants: Sequence[Variant], seed: int) -> list[VariantSummary]:
@@ -59,8 +75,9 @@ def _one(variant: Variant, rows: list[Row], seed: int) -> VariantSummary:
         rng = child_rng(seed, "bootstrap", f"ece_{region}")
         figures[f"ece_{region}"] = calibration_interval(found, [r["scene"] for r in scored], rng)
         diagrams[region] = np.sum(found, axis=0) if found else np.zeros((3, 0))
-    known = [_with_ranks(row) for row in rows]
+    known = [with_places(row) for row in rows]
     figures |= {name: _mean(known, name, seed) for name in RETRIEVAL}
+    figures["ece_retrieval"] = retrieval_calibration(rows)
     return VariantSummary(
         variant=variant,
         objects=len(rows),
@@ -70,6 +87,7 @@ def _one(variant: Variant, rows: list[Row], seed: int) -> VariantSummary:
         seconds={stage: _average(rows, f"seconds_{stage}") for stage in (*STAGES, "total")},
         peak_memory_mb=max((row.get("peak_memory_mb") or 0.0 for row in rows), default=math.nan),
         diagrams=diagrams,
+        hits=hits_by_pixels(rows),
     )
 
 
@@ -112,6 +130,7 @@ def as_record(summary: VariantSummary) -> dict[str, Any]:
         "failed": summary.failed,
         "empty": summary.empty,
         "metrics": {name: interval_record(i) for name, i in summary.figures.items()},
+        "hits": [{k: _json(v) for k, v in _finite(asdict(h)).items()} for h in summary.hits],
         "seconds": {stage: _json(round(s, 4)) for stage, s in summary.seconds.items()},
         "peak_memory_mb": _json(summary.peak_memory_mb),
         "reliability": {
@@ -137,10 +156,9 @@ def _average(rows: Sequence[Row], name: str) -> float:
     return float(np.mean(values)) if values else math.nan
 
 
-def _with_ranks(row: Row) -> Row:
-    """With 0 or 1 for the true object's place, where the prior holds it."""
-    rank = row.get("true_rank")
-    return row if rank is None else {**row, "true_first": rank == 1, "true_in_3": rank <= 3}
+def _finite(record: dict[str, Any]) -> dict[str, Any]:
+    """JSON has no infinity."""
+    return {k: None if v == math.inf else v for k, v in record.items()}
 
 
 def _json(value: float) -> float | None:

@@ -54,6 +54,13 @@ def _brrp(frame: Frame, setup: Setup) -> list[ObjectReconstruction]:
     return result.objects
 
 
+def _retrieval(frame: Frame, setup: Setup) -> list[ObjectReconstruction]:
+    from brrp_cli.methods.retrieval_only import retrieve_objects
+
+    assert setup.prior is not None and setup.retriever is not None
+    return retrieve_objects(frame, setup.prior, setup.retriever, setup.config.k)
+
+
 def _vprism(frame: Frame, setup: Setup) -> list[ObjectReconstruction]:
     from brrp_cli.methods.vprism import reconstruct_vprism
 
@@ -66,5 +73,6 @@ def _vprism_configuration(config: Config) -> dict[str, Any]:
 
 METHODS = {
     "brrp": Method(_brrp, Config.as_dict, uses_prior=True),
+    "retrieval": Method(_retrieval, Config.as_dict, uses_prior=True),
     "vprism": Method(_vprism, _vprism_configuration, uses_prior=False),
 }

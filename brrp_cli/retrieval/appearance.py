@@ -18,7 +18,7 @@ from brrp_cli.frames.observe import box_center
 from brrp_cli.frames.plane import Plane, fit_plane
 from brrp_cli.prior.store import Prior
 from brrp_cli.retrieval.belief import Evidence, believe
-from brrp_cli.retrieval.lights import lights, log_prior
+from brrp_cli.retrieval.lights import lights, local_lights, log_prior
 from brrp_cli.retrieval.likeness import evidence, lit_histograms
 from brrp_cli.retrieval.seen import see_object
 from brrp_cli.retrieval.shortlist import Shortlist
@@ -48,6 +48,7 @@ class AppearanceRetriever:
         self._seed = seed
         self._gains = lights()
         self._light = log_prior(self._gains)
+        self._local = local_lights(self._gains)
         self._frame: Frame | None = None
         self._answers: dict[int, NDArray[np.float64]] = {}
 
@@ -55,7 +56,7 @@ class AppearanceRetriever:
         """P(c|R) (n,) for one object of the frame, in the order of the prior's names; sum <= 1."""
         if frame is not self._frame:
             found = self.evidence(frame)
-            answers = believe(list(found.values()), self._light, len(self._table))
+            answers = believe(list(found.values()), self._light, self._local, len(self._table))
             self._answers = dict(zip(found, answers, strict=True))
             self._frame = frame
         if object_id not in self._answers:
@@ -69,7 +70,7 @@ class AppearanceRetriever:
 
     def evidence(self, frame: Frame) -> dict[int, Evidence]:
         """How alike every object of the frame is to the stored ones, by id."""
-        plane = self._plane(frame)
+        plane = self.plane(frame)
         found = {}
         for object_id in frame.object_ids:
             seen = see_object(frame, object_id, plane)
@@ -78,7 +79,8 @@ class AppearanceRetriever:
             found[object_id] = evidence(seen, histograms, self._table, rows, len(self._gains))
         return found
 
-    def _plane(self, frame: Frame) -> Plane | None:
+    def plane(self, frame: Frame) -> Plane | None:
+        """The support plane of the frame; None where none is found."""
         config = self._config.observation
         points = [frame.object_points(i) for i in frame.object_ids]
         centers = [box_center(p) for p in points if len(p) >= config.min_points]

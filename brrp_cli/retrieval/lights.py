@@ -17,6 +17,10 @@ TINT = np.array([0.95, 1.0, 1.06])  # green over the middle of red and blue
 # How far brightness and warmth lie from 1 before they are seen, standard deviations of logarithms.
 BRIGHTNESS_SPREAD = 0.5
 WARMTH_SPREAD = 0.3
+# How much the light on one object differs from that on the scene: what faces the lamp, what stands
+# in a shadow, what reflects a coloured neighbour.
+LOCAL_BRIGHTNESS_SPREAD = 0.2
+LOCAL_WARMTH_SPREAD = 0.08
 
 
 def lights() -> NDArray[np.float64]:
@@ -25,6 +29,17 @@ def lights() -> NDArray[np.float64]:
         (b * np.sqrt(w), b * t, b / np.sqrt(w)) for b, w, t in product(BRIGHTNESS, WARMTH, TINT)
     ]
     return np.array(table)
+
+
+def local_lights(gains: NDArray[np.floating]) -> NDArray[np.float64]:
+    """P(light on an object | light of the scene) (g, g): row: the scene's, column: the object's."""
+    logs = np.log(gains)
+    apart = logs[:, None] - logs[None]
+    brightness = apart.mean(axis=-1) / LOCAL_BRIGHTNESS_SPREAD
+    warmth = (apart[..., 0] - apart[..., 2]) / LOCAL_WARMTH_SPREAD
+    tint = (apart[..., 1] - (apart[..., 0] + apart[..., 2]) / 2) / LOCAL_WARMTH_SPREAD
+    weight = np.exp(-0.5 * (brightness**2 + warmth**2 + tint**2))
+    return np.asarray(weight / weight.sum(axis=1, keepdims=True))
 
 
 def log_prior(gains: NDArray[np.floating]) -> NDArray[np.float64]:

@@ -14,13 +14,14 @@ from PIL import Image
 
 from brrp_cli import load_frame, make_frame, open_posterior, open_prior, reconstruct
 from brrp_cli.cli import main
-from brrp_cli.config import Config, FeatureConfig
+from brrp_cli.config import Config, FeatureConfig, preset
 from brrp_cli.errors import PriorError
 from brrp_cli.frames.npz import save_frame
 from brrp_cli.geometry import transform_points
 from brrp_cli.prior.build import build_prior
 from brrp_cli.prior.parameters import BuildParameters
 from brrp_cli.raycast import inside, look
+from brrp_cli.retrieval.choose import choose_retriever
 from brrp_cli.shapes import kinds, solids
 
 K = np.array([[300.0, 0, 159.5], [0, 300.0, 119.5], [0, 0, 1]])
@@ -124,8 +125,10 @@ def test_every_object_has_a_status(record):
     }
     assert "5 valid depth points" in by_id[SPECK]["message"]
     assert by_id[BOTTLE]["retrieved"][0]["name"] == "bottle"
-    known = sum(r["probability"] for r in by_id[BOTTLE]["retrieved"])
-    assert known + by_id[BOTTLE]["not_in_prior"] == pytest.approx(1)
+    for item in (by_id[BOTTLE], by_id[CAN]):
+        total = sum(r["probability"] for r in item["retrieved"]) + item["not_in_prior"]
+        assert total == pytest.approx(1) and item["not_in_prior"] < 0.5
+    assert by_id[SPECK]["not_in_prior"] == 0
 
 
 @pytest.mark.parametrize("object_id", [CAN, BOTTLE])
@@ -238,6 +241,19 @@ def test_a_truncated_shard_is_found_before_its_data_are_used(frame_file, prior, 
     code, output = run(frame_file, "--prior", damaged, "-o", tmp_path / "out")
     assert code == 1 and shard.name in output
     assert not (tmp_path / "out").exists()
+
+
+def test_a_table_of_probabilities_is_used_as_it_is(frame_file, prior, tmp_path):
+    table = tmp_path / "table.csv"
+    table.write_text(f"object,name,probability\n{CAN},bottle,0.3\n{BOTTLE},bottle,1\n")
+    retriever = choose_retriever(str(table), open_prior(prior), preset("default"), 0)
+    assert retriever.name == "table"
+    np.testing.assert_array_equal(retriever.probabilities(load_frame(frame_file), CAN), [0.3, 0])
+
+
+def test_a_retriever_is_a_name_or_a_file(frame_file, prior):
+    code, output = run(frame_file, "--prior", prior, "--retriever", "magic")
+    assert code == 2 and "appearance" in output and "'magic' is neither a file nor" in output
 
 
 def test_clip_without_its_folder_says_what_to_pass(frame_file, prior, tmp_path, monkeypatch):

@@ -173,6 +173,27 @@ def test_bare_the_report_lies_beside_the_scenes_and_shifts_are_compared(place):
     assert (folder / "plots" / "iou_shift.png").is_file()
 
 
+def test_retrieval_alone_is_measured(place):
+    options = ["--method", "retrieval", "--retriever", "appearance,uniform", "--workers", "1"]
+    result = run(place, *options, "--prior", place / "prior", "-o", place / "retrieval")
+    assert result.exit_code == 0, result.output
+    assert "retrieval appearance" in result.output and "among 3 1.000" in result.output
+    rows = rows_of(place / "retrieval")
+    assert len(rows) == 6
+    for row in rows:
+        assert row["status"] == "ok" and row["iou"] == ""
+        if row["retriever"] == "uniform":
+            assert float(row["not_in_prior"]) == 0
+        elif int(row["object_id"]) != GHOST:
+            assert row["best"] == row["name"] and row["true_rank"] == "1"
+            assert 0 < float(row["not_in_prior"]) < 0.5
+    report = (place / "retrieval" / "report.md").read_text()
+    assert "by visible pixels" in report
+    summary = json.loads((place / "retrieval" / "summary.json").read_text())
+    hits = summary["results"]["retrieval appearance"]["hits"]
+    assert hits[-1]["above"] == 0 and hits[-1]["most"] is None and hits[-1]["count"] == 3
+
+
 @pytest.mark.parametrize(
     ("options", "text"),
     [

@@ -66,6 +66,22 @@ def bytes_of(folder):
     return {p.relative_to(folder): p.read_bytes() for p in folder.rglob("*") if p.is_file()}
 
 
+def test_varied_light_changes_colours_and_nothing_else(data, made):
+    options = ("--scenes", 2, "--light", "varied")
+    for folder in ("lit", "lit_again"):
+        assert generate(data, data / folder, *options).exit_code == 0
+    plain, lit = bytes_of(made), bytes_of(data / "lit")
+    assert lit == bytes_of(data / "lit_again")
+    changed = {path.name for path in plain if plain[path] != lit[path]}
+    assert plain.keys() == lit.keys() and changed == {"rgb.jpg"}
+    means = [
+        np.asarray(Image.open(data / "lit" / scene / "0000" / "rgb.jpg")).mean(axis=(0, 1))
+        / np.asarray(Image.open(made / scene / "0000" / "rgb.jpg")).mean(axis=(0, 1))
+        for scene in ("00000000", "00000001")
+    ]
+    assert np.abs(np.log(means[0] / means[1])).max() > 0.05, "each scene has its own light"
+
+
 def test_layout_is_the_published_one(made):
     assert sorted(p.name for p in made.iterdir()) == ["00000000", "00000001"]
     entries = json.loads((made / "00000000" / "objects.json").read_text())

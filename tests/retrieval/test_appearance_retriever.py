@@ -1,0 +1,103 @@
+import dataclasses
+
+import numpy as np
+import pytest
+from painted_scene import STRANGE, THINGS, photograph, write_things
+
+from brrp_cli.config import FeatureConfig, preset
+from brrp_cli.errors import RetrievalError
+from brrp_cli.prior.build import build_prior
+from brrp_cli.prior.parameters import BuildParameters
+from brrp_cli.prior.store import open_prior
+from brrp_cli.retrieval.appearance import AppearanceRetriever
+from brrp_cli.retrieval.base import unknown
+
+PLACES = {3: (-0.15, 0.1), 4: (0.12, 0.14), 8: (0.0, -0.02), 9: (0.2, -0.1), 11: (-0.2, -0.14)}
+STRANGER = 20
+
+
+@pytest.fixture(scope="module")
+def prior(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("painted")
+    parameters = BuildParameters(
+        samples=400,
+        surface_points=200,
+        dense_points=2_000,
+        features=FeatureConfig(scales=(1.0,)),
+    )
+    build_prior(write_things(folder / "meshes"), folder / "prior", parameters, workers=1)
+    return open_prior(folder / "prior")
+
+
+@pytest.fixture
+def retriever(prior):
+    return AppearanceRetriever(prior, preset("default"), 0)
+
+
+def scene(light=(1.0, 1.0, 1.0)):
+    names = dict(zip(PLACES, THINGS, strict=True))
+    placed = {i: (*THINGS[name], *PLACES[i]) for i, name in names.items()}
+    return photograph(placed | {STRANGER: (*STRANGE, 0.0, 0.2)}, light), names
+
+
+def test_the_prior_says_which_meshes_have_colours(prior):
+    assert all(entry.record["coloured"] for entry in prior.manifest.objects)
+
+
+@pytest.mark.parametrize("light", [(1, 1, 1), (0.75, 0.65, 0.5), (1.1, 1.2, 1.3)])
+def test_the_true_object_is_first_in_any_light(prior, retriever, light):
+    frame, names = scene(light)
+    for object_id, name in names.items():
+        probabilities = retriever.probabilities(frame, object_id)
+        assert probabilities.shape == (5,) and (probabilities >= 0).all()
+        assert probabilities.sum() <= 1 + 1e-9
+        assert prior.names[int(probabilities.argmax())] == name
+        assert unknown(probabilities) < 0.5
+
+
+def test_a_stranger_is_told(retriever):
+    frame, _ = scene()
+    assert unknown(retriever.probabilities(frame, STRANGER)) > 0.8
+
+
+def test_without_colours_shape_and_size_are_left(prior, retriever):
+    frame, names = scene()
+    grey = dataclasses.replace(frame, rgb=np.full_like(frame.rgb, 127))
+    found = {i: retriever.probabilities(grey, i) for i in names}
+    for object_id, name in names.items():
+        ranked = [prior.names[k] for k in np.argsort(-found[object_id])]
+        if name.endswith("_box"):
+            assert set(ranked[:2]) == {"red_box", "blue_box"}
+        else:
+            assert ranked[0] == name
+
+
+def test_answers_are_those_of_the_frame_that_is_asked_about(prior, retriever):
+    frame, _ = scene()
+    first = retriever.probabilities(frame, 3)
+    swapped = np.where(frame.segmap == 3, 4, np.where(frame.segmap == 4, 3, frame.segmap))
+    other = dataclasses.replace(frame, segmap=swapped)
+    np.testing.assert_allclose(retriever.probabilities(other, 4), first)
+    np.testing.assert_array_equal(retriever.probabilities(frame, 3), first)
+
+
+def test_an_object_that_is_not_there_is_refused(retriever):
+    with pytest.raises(RetrievalError, match="no such object"):
+        retriever.probabilities(scene()[0], 77)
+
+
+def test_an_object_of_few_pixels_gets_an_answer(retriever):
+    frame, _ = scene()
+    segmap = frame.segmap.copy()
+    rows, columns = np.nonzero(segmap == 3)
+    segmap[rows[4:], columns[4:]] = 0
+    few = dataclasses.replace(frame, segmap=segmap)
+    probabilities = retriever.probabilities(few, 3)
+    assert np.isfinite(probabilities).all() and probabilities.sum() <= 1 + 1e-9
+
+
+def test_objects_without_any_depth_get_an_answer(retriever):
+    frame, _ = scene()
+    points = np.where((frame.segmap == 3)[..., None], np.nan, frame.points)
+    blind = dataclasses.replace(frame, points=points.astype(np.float32))
+    assert np.isfinite(retriever.probabilities(blind, 3)).all()
