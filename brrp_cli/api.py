@@ -147,11 +147,7 @@ def reconstruct(
             result = one(scene.objects[object_id])
             _add_surface(result, config)
         except PriorError:
-<<<<<<< HEAD
             # A damaged prior is no fault of the object that comes upon it.
-=======
-            # Not the object's fault: the next one would only fail in its turn.
->>>>>>> appearance
             raise
         except BrrpError as error:
             log.warning("Object %d: %s", object_id, error)
