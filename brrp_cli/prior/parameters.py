@@ -17,12 +17,14 @@ UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001}
 class SampleMix:
     """Where labelled samples lie. Lengths are normalised: the object's largest half-extent is 1.
 
-    A share of `uniform` fills the bounding box grown by `margin` on every side; the rest is split
+    A share of `uniform` fills the cube of half-width `reach` around the object; the rest is split
     evenly over `offsets`: points of the surface moved by Gaussian noise of that standard deviation.
+    The cube is as wide as a map around a small object: where no sample says that space is free,
+    particles keep what they started from.
     """
 
-    uniform: float = 0.5
-    margin: float = 0.25
+    uniform: float = 0.75
+    reach: float = 4.0
     offsets: tuple[float, ...] = (0.1, 0.025)
 
 

@@ -39,8 +39,7 @@ def draw_samples(
     The order is shuffled, so that every leading part has the whole's mix.
     """
     n_near = round(count * (1 - mix.uniform))
-    lower, upper = mesh.bounds
-    points = rng.uniform(lower - mix.margin, upper + mix.margin, size=(count - n_near, 3))
+    points = rng.uniform(-mix.reach, mix.reach, size=(count - n_near, 3))
     near, _ = surface_points(mesh, n_near, rng)
     sigma = np.resize(np.asarray(mix.offsets, dtype=np.float64), n_near)[:, None]
     near = near + rng.normal(size=(n_near, 3)) * sigma
