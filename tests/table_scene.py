@@ -49,7 +49,7 @@ def box() -> trimesh.Trimesh:
 def ell() -> trimesh.Trimesh:
     """An L that stands on its longer leg: no turn maps it to itself."""
     return solids.union(
-        solids.box(0.12, 0.05, 0.04), solids.moved(solids.box(0.04, 0.05, 0.11), x=-0.04)
+        solids.box(0.14, 0.05, 0.04), solids.moved(solids.box(0.03, 0.05, 0.10), x=-0.055)
     )
 
 
