@@ -110,8 +110,9 @@ def weigh(
     known = np.asarray(shares, dtype=np.float64)
     # Ratios among the stored objects are the retriever's, how likely they are as a whole is not:
     # evidence that stands above all doubt outweighs a retriever that was wrong.
-    total = known.sum() or 1.0
-    probability = np.append(known / total * (1 - none), none)
+    if not known.any():
+        known = np.ones_like(known)
+    probability = np.append(known / (known.sum() or 1.0) * (1 - none), none)
     scores = np.append(np.asarray(evidence, dtype=np.float64), config.unknown_evidence)
     log = np.log(np.maximum(probability, config.least_share)) + config.sharpness * scores
     weights = np.exp(log - log.max())
