@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brrp_cli.config import Config, HypothesesConfig, WeighConfig
-from brrp_cli.errors import PriorError
 from brrp_cli.frames.frame import Frame
 from brrp_cli.frames.observe import ObjectObservation
 from brrp_cli.frames.plane import Plane
@@ -25,6 +24,7 @@ from brrp_cli.inference.mean import (
 )
 from brrp_cli.inference.visible_shape import visible_shape
 from brrp_cli.methods.base import OK, ObjectReconstruction, Retrieved
+from brrp_cli.methods.check_prior import no_distances
 from brrp_cli.methods.timing import timed
 from brrp_cli.prior.store import Prior
 from brrp_cli.registration.model import search_model
@@ -174,12 +174,7 @@ def _distance(hypothesis: Hypothesis, points: Array) -> Array:
     """Signed distance (n,), metres, of points (n, 3), camera frame, to the placed shape."""
     stored = hypothesis.model.stored
     if stored.distances is None:
-        raise PriorError(
-            "The prior holds no distances",
-            where=stored.name,
-            expected="a prior of this version of brrp",
-            fix="run brrp build-prior --overwrite on the meshes, or use --preset paper",
-        )
+        raise no_distances(stored.name)
     T_object_cam = np.linalg.inv(hypothesis.T_cam_object)
     unit = stored.half_extent * hypothesis.scale
     return stored.distances.signed_distance(transform_points(T_object_cam, points)) * unit
