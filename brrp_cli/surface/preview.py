@@ -10,11 +10,13 @@ from numpy.typing import NDArray
 
 from brrp_cli.frames.frame import Frame
 from brrp_cli.frames.picture import draw_masks, object_colours
-from brrp_cli.methods.base import ObjectReconstruction
+from brrp_cli.methods.base import ObjectReconstruction, Surface
 from brrp_cli.surface.colours import (
-    logit_spread,
     scale_top,
-    uncertainty_colours,
+    spread,
+    spread_colours,
+    spread_label,
+    spread_meaning,
 )
 from brrp_cli.surface.render import View, fitted, render, view_from_behind
 
@@ -43,8 +45,8 @@ def preview(
     surfaces = [o.surface for o in found if o.surface is not None]
     up = IMAGE_UP if up is None else up
     behind = fitted(view_from_behind(view, _middle(objects), up), surfaces)
-    top = scale_top([s.uncertainty for s in surfaces])
-    unsure = [uncertainty_colours(s.uncertainty, top) for s in surfaces]
+    top = scale_top(surfaces)
+    unsure = [spread_colours(spread(s), top) for s in surfaces]
     colours = object_colours(frame.object_ids)
     shapes = [
         np.tile(colours[o.object_id], (len(o.surface.vertices), 1))
@@ -61,10 +63,10 @@ def preview(
         [
             _captioned(_listing(objects, view.shape), caption),
             _captioned(
-                _with_scale(render(surfaces, unsure, view), top),
-                "uncertainty: spread of the logits, from the camera",
+                _with_scale(render(surfaces, unsure, view), top, surfaces),
+                f"uncertainty: spread of {spread_meaning(surfaces)}, from the camera",
             ),
-            _captioned(_with_scale(render(surfaces, unsure, behind), top), "from behind"),
+            _captioned(_with_scale(render(surfaces, unsure, behind), top, surfaces), "from behind"),
         ],
     ]
     return np.vstack([np.hstack(row) for row in rows])
@@ -123,17 +125,18 @@ def _listing(objects: Sequence[ObjectReconstruction], shape: tuple[int, int]) ->
     return np.asarray(panel)
 
 
-def _with_scale(picture: Picture, top: float) -> Picture:
-    """The picture with a colour bar at its foot."""
+def _with_scale(picture: Picture, top: float, surfaces: Sequence[Surface]) -> Picture:
+    """The picture with a colour bar at its foot, from 0 to the spread `top` of the surfaces."""
     from PIL import Image, ImageDraw
 
     image = Image.fromarray(picture)
     height, width = picture.shape[:2]
     steps = np.linspace(0, top, width // 3)
-    bar = np.tile(uncertainty_colours(steps**2, top)[:, :3], (8, 1, 1))
+    bar = np.tile(spread_colours(steps, top)[:, :3], (8, 1, 1))
     image.paste(Image.fromarray(bar), (10, height - 16))
     draw = ImageDraw.Draw(image)
     draw.text((10, height - 32), "0", fill=INK, font=_font(11))
-    label = f"{float(logit_spread(np.array(top**2))):.2g}"
-    draw.text((10 + width // 3 - 14, height - 32), label, fill=INK, font=_font(11))
+    label = spread_label(top, surfaces)
+    end = (10 + width // 3, height - 32)
+    draw.text(end, label, fill=INK, font=_font(11), anchor="ra")
     return np.asarray(image)
