@@ -19,9 +19,11 @@ if TYPE_CHECKING:
     from brrp_cli.api import Reconstruction
     from brrp_cli.demo.scene import DemoScene
     from brrp_cli.demo.score import Score
+    from brrp_cli.methods.base import ObjectReconstruction
 
 SOME_FAILED = 3
 FRAME = "frame.npz"
+NOT_STORED = "none of them"
 
 
 @click.command("demo")
@@ -65,7 +67,7 @@ def command(output: Path, seed: int, preset_name: str, device: str, overwrite: b
     note(f"Prior: {prior.path} (starter prior), {len(prior.names)} household shapes")
     scene = make_scene(seed)
     config = preset(preset_name)
-    retriever = choose_retriever("fitness", prior, config, seed)
+    retriever = choose_retriever("auto", prior, config, seed)
     note(f"Scene: seed {seed}, {len(scene.truth)} objects. Retrieval: {retriever.name}")
     result = reconstruct(
         scene.frame, prior, config=config, retriever=retriever, seed=seed, device=device
@@ -100,22 +102,45 @@ def report(
     result: Reconstruction, scene: DemoScene, scores: dict[int, Score], stored: set[str]
 ) -> None:
     """Print a line for each object, and the means over those that have a value."""
+    row = "  {:<4}{:<16}{:<10}{:<22}{:<22}{:>5}{:>10}{}".format
     click.echo(
-        f"  id  {'truth':<16}{'in prior':<10}{'retrieved first':<18}{'IoU':>6}{'Chamfer':>11}"
+        row("id", "truth", "in prior", "retrieved first", "most weight", "IoU", "Chamfer", "")
     )
     for item in result.objects:
-        name = scene.names[item.object_id]
-        first = item.retrieved[0].name if item.retrieved else "-"
-        found = scores[item.object_id]
-        status = "" if item.surface is not None else f"  {item.status}"
+        name, found = scene.names[item.object_id], scores[item.object_id]
         click.echo(
-            f"  {item.object_id:<4}{name:<16}{'yes' if name in stored else 'no':<10}{first:<18}"
-            f"{found.iou:>6.2f}{centimetres(found.chamfer):>11}{status}"
+            row(
+                item.object_id,
+                name,
+                "yes" if name in stored else "no",
+                retrieved_first(item),
+                most_weight(item),
+                f"{found.iou:.2f}",
+                centimetres(found.chamfer),
+                "" if item.surface is not None else f"  {item.status}",
+            )
         )
     distances = [s.chamfer for s in scores.values() if not math.isnan(s.chamfer)]
     mean_iou = sum(s.iou for s in scores.values()) / len(scores)
     mean_chamfer = sum(distances) / len(distances) if distances else math.nan
-    click.echo(f"  {'mean':<48}{mean_iou:>6.2f}{centimetres(mean_chamfer):>11}")
+    click.echo(row("mean", "", "", "", "", f"{mean_iou:.2f}", centimetres(mean_chamfer), ""))
+
+
+def retrieved_first(item: ObjectReconstruction) -> str:
+    """What retrieval holds most probable, with its probability."""
+    shares = [(r.probability, r.name) for r in item.retrieved]
+    return largest([*shares, (item.unknown_probability, NOT_STORED)] if shares else [])
+
+
+def most_weight(item: ObjectReconstruction) -> str:
+    """What weighs most in the posterior, with its weight; a dash for a preset without weights."""
+    shares = [(r.weight, r.name) for r in item.retrieved if r.weight is not None]
+    return largest([*shares, (item.unknown_weight or 0.0, NOT_STORED)] if shares else [])
+
+
+def largest(shares: list[tuple[float, str]]) -> str:
+    """The name of the largest share and the share, or a dash."""
+    return "{1} {0:.2f}".format(*max(shares)) if shares else "-"
 
 
 def centimetres(metres: float) -> str:

@@ -21,21 +21,6 @@ from brrp_cli.shapes.household import Shape, household_shapes, household_variati
 if TYPE_CHECKING:
     import trimesh
 
-# Objects of 10 to 27 cm that are no thinner than the map's kernels can hold: a plate or a
-# screwdriver would show a limit of the method, not how it works.
-SCENE_SHAPES = (
-    "cereal_box",
-    "sugar_box",
-    "wood_block",
-    "soup_can",
-    "coffee_can",
-    "mustard_bottle",
-    "water_bottle",
-    "spray_bottle",
-    "bowl",
-    "mug",
-    "plastic_cup",
-)
 STORED, VARIED = 4, 1  # objects of the starter prior, and objects in sizes that it does not hold
 SHAPE = (480, 640)
 INTRINSICS = np.array([[610.0, 0.0, 319.5], [0.0, 610.0, 239.5], [0.0, 0.0, 1.0]])
@@ -120,8 +105,7 @@ def shade(
 
 
 def _choose(rng: np.random.Generator) -> list[Shape]:
-    stored = [shape for shape in household_shapes() if shape.name in SCENE_SHAPES]
-    varied = household_variations()
+    stored, varied = household_shapes(), household_variations()
     return [
         *(stored[i] for i in rng.choice(len(stored), STORED, replace=False)),
         *(varied[i] for i in rng.choice(len(varied), VARIED, replace=False)),

@@ -8,6 +8,8 @@ import sys
 import tempfile
 from pathlib import Path
 
+import numpy as np
+
 from brrp_cli.errors import PriorError
 from brrp_cli.prior.build import build_prior
 from brrp_cli.prior.locate import starter_prior_path
@@ -42,10 +44,19 @@ def starter_prior(workers: int | None = None) -> Path:
 
 
 def write_shapes(folder: Path) -> Path:
-    """Write each household shape as a PLY into `folder`; returns the file of their descriptions."""
+    """Write each household shape, in its colour, as a PLY into `folder`; returns the file of their
+    descriptions."""
+    import trimesh
+
     shapes = household_shapes()
     for shape in shapes:
-        shape.mesh.export(folder / f"{shape.name}.ply")
+        painted = trimesh.Trimesh(
+            shape.mesh.vertices,
+            shape.mesh.faces,
+            vertex_colors=np.tile([*shape.color, 255], (len(shape.mesh.vertices), 1)),
+            process=False,
+        )
+        painted.export(folder / f"{shape.name}.ply")
     descriptions = folder / "descriptions.json"
     phrases = {shape.name: shape.description for shape in shapes}
     descriptions.write_text(json.dumps(phrases), encoding="utf-8")

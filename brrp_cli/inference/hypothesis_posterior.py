@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from brrp_cli.inference.mean import MeanLattice
 from brrp_cli.inference.posterior import HilbertPosterior, mean_occupancy
-from brrp_cli.methods.base import Axes
+from brrp_cli.methods.base import METRES, Axes
 
 # Standard deviation of the logistic distribution over 4: a surface whose occupancy is a logistic
 # function of the way across it has this over the gradient as standard deviation of its place.
@@ -54,6 +54,11 @@ class HypothesisPosterior:
         """Variance (n,) of occupancy, p (1 - p): at most 0.25, between the hypotheses' surfaces."""
         p = self.probability(points)
         return p * (1 - p)
+
+    @property
+    def surface_unit(self) -> str:
+        """Unit of `surface_uncertainty`."""
+        return METRES
 
     def surface_uncertainty(self, vertices: NDArray[np.floating]) -> NDArray[np.float32]:
         """Standard deviation (n,), metres, of the surface's place at its vertices (n, 3).

@@ -9,7 +9,7 @@ import torch
 from numpy.typing import NDArray
 
 from brrp_cli.inference.hinge import HingeGrid, features, lattice_logits
-from brrp_cli.methods.base import Axes
+from brrp_cli.methods.base import LOGIT_VARIANCE, Axes
 
 # Features of this many points are formed at once: 20,000 x 1,729 floats are 140 MB.
 CHUNK = 20_000
@@ -48,6 +48,11 @@ class HilbertPosterior:
     def uncertainty(self, points: NDArray[np.floating]) -> NDArray[np.float32]:
         """Variance over particles of w . phi, (n,)."""
         return np.asarray(self.logits(points).var(axis=0))
+
+    @property
+    def surface_unit(self) -> str:
+        """Unit of `surface_uncertainty`."""
+        return LOGIT_VARIANCE
 
     def surface_uncertainty(self, vertices: NDArray[np.floating]) -> NDArray[np.float32]:
         """`uncertainty` (n,) at vertices (n, 3)."""

@@ -18,6 +18,10 @@ TOO_FEW_POINTS = "too_few_points"
 NO_SURFACE = "no_surface"
 FAILED = "failed"
 
+# Units of uncertainty on a surface: standard deviation of its place, or variance of the logit.
+METRES = "metre"
+LOGIT_VARIANCE = "logit^2"
+
 
 class OccupancyPosterior(Protocol):
     """A distribution over one object's shape, in the camera frame.
@@ -35,12 +39,16 @@ class OccupancyPosterior(Protocol):
     def probability_volume(self, axes: Axes) -> NDArray[np.float32]:
         """Occupancy probability (nx, ny, nz) on a lattice of camera-frame coordinates, metres."""
 
+    @property
+    def surface_unit(self) -> str:
+        """Unit of `surface_uncertainty`: METRES or LOGIT_VARIANCE."""
+
     def uncertainty(self, points: NDArray[np.floating]) -> NDArray[np.float32]:
         """How unsure (n,), >= 0, in the method's own unit: what ranks errors of occupancy."""
 
     def surface_uncertainty(self, vertices: NDArray[np.floating]) -> NDArray[np.float32]:
         """How unsure (n,), >= 0, the surface is at its own vertices (n, 3), where occupancy is 0.5
-        everywhere; in the method's own unit."""
+        everywhere; in `surface_unit`."""
 
 
 @dataclass(frozen=True)
@@ -48,12 +56,13 @@ class Surface:
     """A closed, outward triangle mesh.
 
     vertices : (n, 3) float64, metres, camera frame; faces : (m, 3) int64; uncertainty : (n,)
-    float32, the posterior's uncertainty at each vertex.
+    float32, the posterior's uncertainty at each vertex, in `uncertainty_unit`.
     """
 
     vertices: NDArray[np.float64]
     faces: NDArray[np.int64]
     uncertainty: NDArray[np.float32]
+    uncertainty_unit: str
 
     def as_trimesh(self) -> trimesh.Trimesh:
         """The same as a trimesh, vertices in the same order."""

@@ -19,7 +19,13 @@ from brrp_cli.inference.block_features import KernelBasis
 from brrp_cli.inference.expected_softmax import expected_softmax
 from brrp_cli.inference.scene_hinges import scene_hinges
 from brrp_cli.inference.softmax_map import SoftmaxMap, fit_softmax_map
-from brrp_cli.methods.base import OK, TOO_FEW_POINTS, Axes, ObjectReconstruction
+from brrp_cli.methods.base import (
+    LOGIT_VARIANCE,
+    OK,
+    TOO_FEW_POINTS,
+    Axes,
+    ObjectReconstruction,
+)
 from brrp_cli.seeds import child_rng
 
 
@@ -48,6 +54,11 @@ class VPrismPosterior:
         """`probability` (nx, ny, nz) on a lattice of camera-frame coordinates, metres."""
         nodes = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
         return self.probability(nodes.reshape(-1, 3)).reshape(nodes.shape[:3])
+
+    @property
+    def surface_unit(self) -> str:
+        """Unit of `surface_uncertainty`."""
+        return LOGIT_VARIANCE
 
     def surface_uncertainty(self, vertices: NDArray[np.floating]) -> NDArray[np.float32]:
         """`uncertainty` (n,) at vertices (n, 3)."""

@@ -37,7 +37,12 @@ def extract_surface(
     volume = np.pad(volume, 1)
     vertices, faces, _, _ = marching_cubes(volume, config.level, gradient_direction="ascent")
     vertices = (vertices.astype(np.float64) - 1) * config.spacing + origin
-    return Surface(vertices, faces.astype(np.int64), posterior.surface_uncertainty(vertices))
+    return Surface(
+        vertices,
+        faces.astype(np.int64),
+        posterior.surface_uncertainty(vertices),
+        posterior.surface_unit,
+    )
 
 
 def _near_observed(

@@ -12,9 +12,11 @@ from brrp_cli.frames.frame import Frame
 from brrp_cli.frames.picture import draw_masks, object_colours
 from brrp_cli.methods.base import ObjectReconstruction
 from brrp_cli.surface.colours import (
-    logit_spread,
     scale_top,
-    uncertainty_colours,
+    spread,
+    spread_colours,
+    spread_label,
+    spread_meaning,
 )
 from brrp_cli.surface.render import View, fitted, render, view_from_behind
 
@@ -24,6 +26,8 @@ PANEL_WIDTH = 480
 CAPTION = 28
 INK = (30, 30, 30)
 IMAGE_UP = np.array([0.0, -1.0, 0.0])
+NOT_STORED = "none of them"
+LEAST = 0.005  # weights and probabilities that are not 0.00 when they are read
 
 
 def preview(
@@ -43,8 +47,8 @@ def preview(
     surfaces = [o.surface for o in found if o.surface is not None]
     up = IMAGE_UP if up is None else up
     behind = fitted(view_from_behind(view, _middle(objects), up), surfaces)
-    top = scale_top([s.uncertainty for s in surfaces])
-    unsure = [uncertainty_colours(s.uncertainty, top) for s in surfaces]
+    top = scale_top(surfaces)
+    unsure = [spread_colours(spread(s), top) for s in surfaces]
     colours = object_colours(frame.object_ids)
     shapes = [
         np.tile(colours[o.object_id], (len(o.surface.vertices), 1))
@@ -52,6 +56,7 @@ def preview(
         if o.surface is not None
     ]
     masks = draw_masks(frame.rgb, frame.segmap)
+    meaning = spread_meaning(surfaces)
     rows = [
         [
             _captioned(_resized(masks, view.shape), "input and masks"),
@@ -61,10 +66,14 @@ def preview(
         [
             _captioned(_listing(objects, view.shape), caption),
             _captioned(
-                _with_scale(render(surfaces, unsure, view), top),
-                "uncertainty: spread of the logits, from the camera",
+                render(surfaces, unsure, view),
+                f"uncertainty: spread of {meaning}, from the camera",
             ),
-            _captioned(_with_scale(render(surfaces, unsure, behind), top), "from behind"),
+            _with_scale(
+                _captioned(render(surfaces, unsure, behind), "from behind"),
+                top,
+                spread_label(top, surfaces),
+            ),
         ],
     ]
     return np.vstack([np.hstack(row) for row in rows])
@@ -104,7 +113,7 @@ def _captioned(picture: Picture, text: str) -> Picture:
 
 
 def _listing(objects: Sequence[ObjectReconstruction], shape: tuple[int, int]) -> Picture:
-    """One line for each object: id, status, and what was retrieved."""
+    """Two lines for each object: id, status and weights in the posterior; what was retrieved."""
     from PIL import Image, ImageDraw
 
     height, width = shape
@@ -117,23 +126,38 @@ def _listing(objects: Sequence[ObjectReconstruction], shape: tuple[int, int]) ->
         y = 6 + row * line
         colour = tuple(int(c) for c in colours[item.object_id])
         draw.rectangle((8, y, 20, y + 12), fill=colour)
-        names = ", ".join(f"{r.name} {r.probability:.2f}" for r in item.retrieved)
-        draw.text((26, y), f"{item.object_id}: {item.status}", fill=INK, font=_font(size))
-        draw.text((26, y + line // 2 - 2), names or item.message, fill=INK, font=_font(size))
+        first, second = _told(item)
+        draw.text((26, y), first, fill=INK, font=_font(size))
+        draw.text((26, y + line // 2 - 2), second, fill=INK, font=_font(size))
     return np.asarray(panel)
 
 
-def _with_scale(picture: Picture, top: float) -> Picture:
-    """The picture with a colour bar at its foot."""
+def _told(item: ObjectReconstruction) -> tuple[str, str]:
+    first = f"{item.object_id}: {item.status}"
+    weights = [(r.name, r.weight) for r in item.retrieved if r.weight is not None]
+    if weights:
+        weights.append((NOT_STORED, item.unknown_weight or 0.0))
+        counting = [f"{name} {weight:.2f}" for name, weight in weights if weight >= LEAST]
+        first += f"; weights {', '.join(counting)}"
+    retrieved = [f"{r.name} {r.probability:.2f}" for r in item.retrieved]
+    if item.retrieved and item.unknown_probability >= LEAST:
+        retrieved.append(f"{NOT_STORED} {item.unknown_probability:.2f}")
+    return first, ", ".join(retrieved) or item.message
+
+
+def _with_scale(panel: Picture, top: float, label: str) -> Picture:
+    """The panel with a colour bar in its caption, from 0 to the spread `top`, which reads `label`.
+
+    In the picture it would hide what lies there.
+    """
     from PIL import Image, ImageDraw
 
-    image = Image.fromarray(picture)
-    height, width = picture.shape[:2]
-    steps = np.linspace(0, top, width // 3)
-    bar = np.tile(uncertainty_colours(steps**2, top)[:, :3], (8, 1, 1))
-    image.paste(Image.fromarray(bar), (10, height - 16))
+    image = Image.fromarray(panel)
+    length = image.width // 3
+    left = image.width - length - 70
+    bar = np.tile(spread_colours(np.linspace(0, top, length), top)[:, :3], (10, 1, 1))
+    image.paste(Image.fromarray(bar), (left, 9))
     draw = ImageDraw.Draw(image)
-    draw.text((10, height - 32), "0", fill=INK, font=_font(11))
-    label = f"{float(logit_spread(np.array(top**2))):.2g}"
-    draw.text((10 + width // 3 - 14, height - 32), label, fill=INK, font=_font(11))
+    draw.text((left - 6, 7), "0", fill=INK, font=_font(12), anchor="ra")
+    draw.text((left + length + 6, 7), label, fill=INK, font=_font(12))
     return np.asarray(image)

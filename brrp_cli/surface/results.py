@@ -16,7 +16,7 @@ from brrp_cli.frames.frame import Frame
 from brrp_cli.geometry import transform_points
 from brrp_cli.inference.posterior_file import save_posteriors
 from brrp_cli.methods.base import ObjectReconstruction, Retrieved, Surface
-from brrp_cli.surface.colours import scale_top, uncertainty_colours
+from brrp_cli.surface.colours import scale_top, spread, spread_colours
 from brrp_cli.surface.preview import preview
 from brrp_cli.version import __version__
 
@@ -97,12 +97,12 @@ def _meshes(
     import trimesh
 
     found = [(o.object_id, o.surface) for o in result.objects if o.surface is not None]
-    top = scale_top([surface.uncertainty for _, surface in found])
+    top = scale_top([surface for _, surface in found])
     return {
         object_id: trimesh.Trimesh(
             transform_points(T_target_cam, surface.vertices),
             surface.faces,
-            vertex_colors=uncertainty_colours(surface.uncertainty, top),
+            vertex_colors=spread_colours(spread(surface), top),
             vertex_attributes={"uncertainty": surface.uncertainty.astype(np.float32)},
             process=False,
         )
@@ -175,6 +175,7 @@ def _surface_record(surface: Surface, T_target_cam: NDArray[np.float64]) -> dict
         "extents": (high - low).tolist(),
         "volume_litre": float(surface.as_trimesh().volume * 1000),
         "mean_uncertainty": float(surface.uncertainty.mean()),
+        "uncertainty_unit": surface.uncertainty_unit,
     }
 
 

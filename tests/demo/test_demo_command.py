@@ -15,7 +15,7 @@ from brrp_cli.frames.npz import load_frame
 @pytest.fixture
 def small(two_shapes, tmp_path, monkeypatch):
     """One object in the scene and two in the prior."""
-    monkeypatch.setattr(scene, "SCENE_SHAPES", tuple(shape.name for shape in two_shapes))
+    monkeypatch.setattr(scene, "household_shapes", lambda: two_shapes)
     monkeypatch.setattr(scene, "STORED", 1)
     monkeypatch.setattr(scene, "VARIED", 0)
     monkeypatch.chdir(tmp_path)
@@ -35,10 +35,12 @@ def test_the_demo_ends_with_scores_and_files(small):
     found = trimesh.load(out / "result" / "object_1.ply")
     assert np.linalg.norm(truth.bounds.mean(axis=0) - found.bounds.mean(axis=0)) < 0.03
     assert (out / "result" / "preview.png").stat().st_size > 10_000
-    assert json.loads((out / "result" / "result.json").read_text())["retriever"] == "fitness"
+    assert json.loads((out / "result" / "result.json").read_text())["retriever"] == "appearance"
     row = next(line for line in result.output.splitlines() if line.startswith("  1 "))
     assert row.split()[1] in ("soup_can", "wood_block")
-    assert 0.3 < float(row.split()[4]) <= 1.0
+    # What it was taken for, and IoU before the distance and its unit.
+    assert row.split()[3] == row.split()[5] == row.split()[1]
+    assert 0.7 < float(row.split()[-3]) <= 1.0
 
     again = CliRunner().invoke(main, ["demo"])
     assert again.exit_code == 1
@@ -60,4 +62,4 @@ def test_the_whole_demo(tmp_path, monkeypatch):
     result = CliRunner().invoke(main, ["demo", "-o", str(tmp_path / "out")])
     assert result.exit_code == 0, result.output
     mean = next(line for line in result.output.splitlines() if line.startswith("  mean"))
-    assert float(mean.split()[1]) > 0.4
+    assert float(mean.split()[1]) > 0.6

@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 import trimesh
 
-from brrp_cli.methods.base import Surface
-from brrp_cli.surface.colours import scale_top, uncertainty_colours
+from brrp_cli.methods.base import LOGIT_VARIANCE, METRES, Surface
+from brrp_cli.surface.colours import scale_top, spread, spread_colours, spread_label
 from brrp_cli.surface.render import BACKGROUND, View, fitted, render, view_from_behind
 
 K = np.array([[200.0, 0, 100], [0, 200, 80], [0, 0, 1]])
@@ -14,7 +14,11 @@ UP = np.array([0.0, -1.0, 0.0])
 def ball(x, y, z, radius):
     mesh = trimesh.creation.icosphere(subdivisions=3, radius=radius)
     mesh.apply_translation([x, y, z])
-    return Surface(mesh.vertices, mesh.faces, np.zeros(len(mesh.vertices), np.float32))
+    return unsure(mesh, np.zeros(len(mesh.vertices)), METRES)
+
+
+def unsure(mesh, values, unit):
+    return Surface(mesh.vertices, mesh.faces, np.asarray(values, np.float32), unit)
 
 
 def painted(surface, red, green, blue):
@@ -63,12 +67,24 @@ def test_no_surface_gives_an_empty_picture():
 
 
 def test_unsure_is_brighter_than_sure():
-    colours = uncertainty_colours(np.array([0.0, 1.0, 4.0]), top=2.0)[:, :3].sum(axis=1)
+    colours = spread_colours(np.array([0.0, 1.0, 2.0]), top=2.0)[:, :3].sum(axis=1)
     assert colours[0] < colours[1] < colours[2]
 
 
 def test_the_scale_ignores_a_few_outliers_and_an_empty_scene():
-    variances = np.ones(1000)
-    variances[:5] = 1e6
-    assert scale_top([variances]) == 1
+    mesh = trimesh.creation.icosphere(subdivisions=3)
+    values = np.full(len(mesh.vertices), 0.004)
+    values[:5] = 1e6
+    assert scale_top([unsure(mesh, values, METRES)]) == pytest.approx(0.004)
     assert scale_top([]) == 1
+
+
+def test_a_spread_is_a_length_or_the_root_of_a_variance():
+    mesh = trimesh.creation.icosphere(subdivisions=1)
+    values = np.full(len(mesh.vertices), 0.0025)
+    place, logit = unsure(mesh, values, METRES), unsure(mesh, values, LOGIT_VARIANCE)
+    np.testing.assert_allclose(spread(place), 0.0025, rtol=1e-6)
+    np.testing.assert_allclose(spread(logit), 0.05, rtol=1e-6)
+    assert scale_top([place]) == pytest.approx(0.0025)
+    assert spread_label(0.0025, [place]) == "2.5 mm"
+    assert spread_label(0.05, [logit]) == "0.05"
