@@ -10,7 +10,7 @@ import trimesh
 from older_prior import older_prior
 from table_scene import box, in_camera, photograph, placed
 
-from brrp_cli import open_prior, reconstruct
+from brrp_cli import open_posterior, open_prior, reconstruct, write_results
 from brrp_cli.config import preset
 from brrp_cli.errors import PriorError
 from brrp_cli.geometry import transform_points
@@ -119,12 +119,21 @@ def test_an_object_that_the_prior_does_not_hold_gets_the_shape_of_what_was_seen(
 
 def test_retrieval_that_is_wrong_is_outweighed_by_what_the_frame_says(folder, truth):
     prior = open_prior(folder)
-    wrong = TruthRetriever(prior.names, {BOX: "can", CAN: "box"})
-    found = reconstruct(photograph(truth), prior, retriever=wrong)
-    for item, name in zip(found.objects, ("can", "box"), strict=True):
-        weights = {r.name: r.weight for r in item.retrieved}
-        assert weights[name] == max(weights.values())
-        assert iou(item.surface, truth[item.object_id]) > 0.85
+    wrong = TruthRetriever(prior.names, {CAN: "box"})
+    found = reconstruct(photograph({CAN: truth[CAN]}), prior, retriever=wrong).objects[0]
+    weights = {r.name: r.weight for r in found.retrieved}
+    assert [r.name for r in found.retrieved] == ["box", "can"]
+    assert weights["can"] > 0.9
+    assert iou(found.surface, truth[CAN]) > 0.85
+
+
+def test_a_map_that_is_nowhere_sure_enough_has_no_surface_but_files(folder, truth, tmp_path):
+    config = replace(CONFIG, surface=replace(CONFIG.surface, level=0.99999))
+    result = reconstruct(photograph({CAN: truth[CAN]}), open_prior(folder), config=config)
+    assert result.objects[0].status == NO_SURFACE
+    names = {path.name for path in write_results(result, tmp_path / "out")}
+    assert names == {"posterior.h5", "result.json", "preview.png"}
+    assert list(open_posterior(tmp_path / "out" / "posterior.h5")) == [CAN]
 
 
 def test_without_a_table_in_sight_there_is_a_result_too(folder, truth):
