@@ -7,7 +7,6 @@ result.objects[0].surface.as_trimesh()
 
 from __future__ import annotations
 
-import json
 import logging
 import time
 from dataclasses import asdict, dataclass, field
@@ -20,8 +19,8 @@ from brrp_cli.frames.frame import Frame
 from brrp_cli.frames.observe import ObjectObservation, observe
 from brrp_cli.frames.plane import Plane
 from brrp_cli.methods.base import FAILED, NO_SURFACE, OK, TOO_FEW_POINTS, ObjectReconstruction
+from brrp_cli.methods.check_prior import check_prior
 from brrp_cli.methods.registry import METHODS
-from brrp_cli.prior.parameters import differences
 from brrp_cli.prior.store import Prior
 from brrp_cli.progress import progress
 
@@ -75,20 +74,6 @@ def pick_device(device: str) -> str:
     return device
 
 
-def check_features(prior: Prior, config: Config) -> None:
-    """PriorError unless the prior's clouds and features were made as `config` makes them."""
-    # As JSON gives it back: tuples are lists.
-    wanted = json.loads(json.dumps(asdict(config.features)))
-    lines = differences(prior.parameters["features"], wanted)
-    if lines:
-        raise PriorError(
-            "The prior's features are not those of the configuration",
-            where=prior.path,
-            found="; ".join(lines),
-            fix="build the prior anew, or use the configuration that it was built for",
-        )
-
-
 def reconstruct(
     frame: Frame,
     prior: Prior | None = None,
@@ -119,7 +104,7 @@ def reconstruct(
     from brrp_cli.methods.hypothesise import reconstruct_by_hypotheses
     from brrp_cli.retrieval.choose import choose_retriever
 
-    check_features(prior, config)
+    check_prior(prior, config)
     device = pick_device(device)
     seconds: dict[str, float] = {}
     start = time.perf_counter()

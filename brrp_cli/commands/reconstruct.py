@@ -109,9 +109,10 @@ def command(
     write_results(result, output, frame=coordinates, overwrite=overwrite)
     report(result)
     done = len(result.reconstructed)
+    meshes = "object_*.ply, scene.glb, " if done else "no mesh: result.json says why; "
     click.echo(
         f"Wrote {done} of {len(result.objects)} objects, metres, {coordinates} frame: {output}/ "
-        "(object_*.ply, scene.glb, posterior.h5, result.json, preview.png)"
+        f"({meshes}posterior.h5, result.json, preview.png)"
     )
     if done < len(result.objects):
         sys.exit(SOME_FAILED)

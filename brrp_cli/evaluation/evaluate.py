@@ -28,10 +28,11 @@ from brrp_cli.evaluation.summary import (
 from brrp_cli.evaluation.true_meshes import truth_cache
 from brrp_cli.evaluation.variants import Variant, expand, same_results, short_labels
 from brrp_cli.files import sha256_file, write_bytes
+from brrp_cli.methods.check_prior import check_prior
 from brrp_cli.methods.registry import METHODS
 from brrp_cli.prior.store import Prior
 from brrp_cli.progress import progress
-from brrp_cli.retrieval.choose import USE_CLIP, resolve_name
+from brrp_cli.retrieval.choose import USE_APPEARANCE, USE_CLIP, resolve_name
 from brrp_cli.retrieval.clip_files import clip_folder, need_clip_folder
 from brrp_cli.version import __version__
 
@@ -85,6 +86,7 @@ def evaluate(request: Request, say: Callable[[str], None] = lambda text: None) -
         [resolve_name(name, request.clip_dir, opened) for name in request.retrievers],
         request.shifts,
     )
+    _check_prior(opened, variants)
     if any(variant.retriever in USE_CLIP for variant in variants):
         _prepare_clip(opened, need_clip_folder(request.clip_dir))
     parameters = _parameters(request, scenes, variants, prior)
@@ -168,6 +170,20 @@ def _prior(request: Request) -> Prior | None:
         return None
     path, _ = locate_prior(request.prior)
     return open_prior(path)
+
+
+def _check_prior(prior: Prior | None, variants: Sequence[Variant]) -> None:
+    """What a variant lacks in the prior is told now, not in every row. Errors: PriorError,
+    RetrievalError."""
+    from brrp_cli.retrieval.appearance import need_appearance
+
+    if prior is None:
+        return
+    for variant in variants:
+        if variant.method == "brrp":
+            check_prior(prior, variant.config)
+        if variant.retriever in USE_APPEARANCE:
+            need_appearance(prior)
 
 
 def _prepare_clip(prior: Prior | None, folder: Path) -> None:

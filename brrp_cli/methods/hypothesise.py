@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brrp_cli.config import Config, HypothesesConfig, WeighConfig
-from brrp_cli.errors import PriorError
 from brrp_cli.frames.frame import Frame
 from brrp_cli.frames.observe import ObjectObservation
 from brrp_cli.frames.plane import Plane
@@ -25,6 +24,7 @@ from brrp_cli.inference.mean import (
 )
 from brrp_cli.inference.visible_shape import visible_shape
 from brrp_cli.methods.base import OK, ObjectReconstruction, Retrieved
+from brrp_cli.methods.check_prior import no_distances
 from brrp_cli.methods.timing import timed
 from brrp_cli.prior.store import Prior
 from brrp_cli.registration.model import search_model
@@ -110,8 +110,9 @@ def weigh(
     known = np.asarray(shares, dtype=np.float64)
     # Ratios among the stored objects are the retriever's, how likely they are as a whole is not:
     # evidence that stands above all doubt outweighs a retriever that was wrong.
-    total = known.sum() or 1.0
-    probability = np.append(known / total * (1 - none), none)
+    if not known.any():
+        known = np.ones_like(known)
+    probability = np.append(known / (known.sum() or 1.0) * (1 - none), none)
     scores = np.append(np.asarray(evidence, dtype=np.float64), config.unknown_evidence)
     log = np.log(np.maximum(probability, config.least_share)) + config.sharpness * scores
     weights = np.exp(log - log.max())
@@ -173,12 +174,7 @@ def _distance(hypothesis: Hypothesis, points: Array) -> Array:
     """Signed distance (n,), metres, of points (n, 3), camera frame, to the placed shape."""
     stored = hypothesis.model.stored
     if stored.distances is None:
-        raise PriorError(
-            "The prior holds no distances",
-            where=stored.name,
-            expected="a prior of this version of brrp",
-            fix="run brrp build-prior --overwrite on the meshes, or use --preset paper",
-        )
+        raise no_distances(stored.name)
     T_object_cam = np.linalg.inv(hypothesis.T_cam_object)
     unit = stored.half_extent * hypothesis.scale
     return stored.distances.signed_distance(transform_points(T_object_cam, points)) * unit

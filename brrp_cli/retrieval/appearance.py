@@ -8,6 +8,8 @@ object. The constants that turn likeness into probability are in belief.py.
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -24,6 +26,19 @@ from brrp_cli.retrieval.seen import see_object
 from brrp_cli.retrieval.shortlist import Shortlist
 
 
+def need_appearance(prior: Prior) -> NDArray[Any]:
+    """The prior's descriptors, a row for each object. Errors: RetrievalError if it has none."""
+    table = prior.appearance
+    if table is None:
+        raise RetrievalError(
+            "The prior does not know what its objects look like",
+            where=prior.path,
+            found="a prior that an older brrp built",
+            fix="run brrp build-prior MESHES --overwrite, or pass --retriever fitness",
+        )
+    return table
+
+
 class AppearanceRetriever:
     """P(c|R) from colour, shape and size. Errors: RetrievalError if the prior has no descriptors.
 
@@ -34,14 +49,7 @@ class AppearanceRetriever:
     name = "appearance"
 
     def __init__(self, prior: Prior, config: Config, seed: int) -> None:
-        table = prior.appearance
-        if table is None:
-            raise RetrievalError(
-                "The prior does not know what its objects look like",
-                where=prior.path,
-                found="a prior that an older brrp built",
-                fix="run brrp build-prior MESHES --overwrite, or pass --retriever fitness",
-            )
+        table = need_appearance(prior)
         self._table = table
         self._shortlist = Shortlist(table)
         self._config = config

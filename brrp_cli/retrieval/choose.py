@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 # In place of a name, a file with probabilities may stand.
 RETRIEVERS = ("auto", "clip", "appearance", "both", "fitness", "uniform")
 USE_CLIP = ("clip", "both")
+USE_APPEARANCE = ("appearance", "both")
 
 
 def resolve_name(name: str, clip_dir: Path | None = None, prior: Prior | None = None) -> str:

@@ -35,6 +35,8 @@ def write_results(
 ) -> list[Path]:
     """Write everything into `folder`, whole or not at all; returns the paths of the files.
 
+    Where no object has a surface there is no scene.glb: a scene of nothing cannot be exported.
+
     frame : "camera" or "world", the frame of the meshes (metres either way). Errors: OutputError
     if the folder exists and `overwrite` is false, if it cannot be written, or if "world" is asked
     of a frame without T_world_cam.
@@ -46,7 +48,8 @@ def write_results(
         meshes = _meshes(result, T_target_cam)
         for object_id, mesh in meshes.items():
             mesh.export(partial / mesh_name(object_id))
-        _scene(meshes).export(partial / "scene.glb")
+        if meshes:
+            _scene(meshes).export(partial / "scene.glb")
         posteriors = {o.object_id: o.posterior for o in result.objects if o.posterior is not None}
         save_posteriors(posteriors, partial / "posterior.h5")
         record = json.dumps(result_record(result, frame), indent=2) + "\n"

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 import trimesh
 from click.testing import CliRunner
+from older_prior import older_prior
 from PIL import Image
 
 from brrp_cli import load_frame, make_frame, open_posterior, open_prior, reconstruct
@@ -240,6 +241,37 @@ def test_a_truncated_shard_is_found_before_its_data_are_used(frame_file, prior, 
     shard.write_bytes(shard.read_bytes()[:-1000])
     code, output = run(frame_file, "--prior", damaged, "-o", tmp_path / "out")
     assert code == 1 and shard.name in output
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("options", [(), ("--preset", "paper"), ("--method", "vprism")])
+def test_where_no_object_gets_a_surface_the_record_is_written_all_the_same(
+    frame_file, prior, tmp_path, options
+):
+    frame = load_frame(frame_file)
+    masks = np.where(frame.segmap == SPECK, SPECK, 0)
+    depth = np.nan_to_num(frame.points[..., 2])
+    save_frame(make_frame(frame.rgb, masks, depth=depth, K=K), tmp_path / "speck.npz")
+    of_a_prior = () if "vprism" in options else ("--prior", prior)
+    code, output = run(tmp_path / "speck.npz", *of_a_prior, *options, "-o", tmp_path / "out")
+    assert code == 3
+    assert "object 12: too_few_points  5 " in output and "are needed" in output
+    assert "Wrote 0 of 1 objects" in output and "no mesh: result.json says why" in output
+    names = {path.name for path in (tmp_path / "out").iterdir()}
+    assert names == {"posterior.h5", "result.json", "preview.png"}
+    record = json.loads((tmp_path / "out" / "result.json").read_text())
+    assert [(o["id"], o["status"], o["mesh"]) for o in record["objects"]] == [
+        (SPECK, "too_few_points", None)
+    ]
+    assert Image.open(tmp_path / "out" / "preview.png").size[0] == 3 * 480
+    assert open_posterior(tmp_path / "out" / "posterior.h5") == {}
+
+
+def test_an_older_prior_is_refused_by_one_message_that_says_what_to_do(frame_file, prior, tmp_path):
+    older = older_prior(prior, tmp_path / "older")
+    code, output = run(frame_file, "--prior", older, "-o", tmp_path / "out")
+    assert code == 1 and output.count("no distances") == 1
+    assert "build-prior MESHES --overwrite" in output and "--preset paper" in output
     assert not (tmp_path / "out").exists()
 
 

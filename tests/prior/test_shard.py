@@ -8,6 +8,7 @@ from brrp_cli.appearance.colour import COLOUR_BINS
 from brrp_cli.appearance.descriptor import Appearance
 from brrp_cli.appearance.pairs import PAIR_BINS
 from brrp_cli.errors import PriorError
+from brrp_cli.prior.distance_field import DistanceField
 from brrp_cli.prior.objects import FeatureCloud, PriorObject, RestingPose
 from brrp_cli.prior.pack import pack, unpack
 from brrp_cli.prior.shard import ARRAYS, object_names, open_shard, read_stored, write_shard
@@ -38,6 +39,12 @@ def example(name: str = "cup", seed: int = 0) -> PriorObject:
             pairs=rng.integers(0, 256, (5, PAIR_BINS), dtype=np.uint8),
             sizes=rng.random((2, 3), dtype=np.float32),
         ),
+        distances=DistanceField(
+            lower=np.array([-1.5, -1.25, -0.75]),
+            spacing=0.5,
+            # As a shard keeps them, in half precision.
+            values=rng.normal(size=(7, 6, 4)).astype(np.float16).astype(np.float32),
+        ),
     )
 
 
@@ -67,6 +74,9 @@ def test_what_is_written_is_read(shard: Path) -> None:
         np.testing.assert_allclose(cloud.fpfh, want.clouds[scale].fpfh, rtol=1e-3)
         assert cloud.fpfh.dtype == np.float64
     assert [pose.probability for pose in got.poses] == [0.75, 0.25]
+    np.testing.assert_array_equal(got.distances.values, want.distances.values)
+    np.testing.assert_array_equal(got.distances.lower, want.distances.lower)
+    assert got.distances.spacing == want.distances.spacing
 
 
 def test_taking_an_object_over_gives_the_same_bytes(shard: Path, tmp_path: Path) -> None:

@@ -1,0 +1,39 @@
+"""Whether a prior suits a configuration, told before any work is done with it."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict
+
+from brrp_cli.config import Config
+from brrp_cli.errors import PriorError
+from brrp_cli.prior.parameters import differences
+from brrp_cli.prior.store import Prior
+
+
+def check_prior(prior: Prior, config: Config) -> None:
+    """PriorError unless the prior's clouds and features were made as `config` makes them, and
+    distances are there if it asks for them."""
+    # As JSON gives it back: tuples are lists.
+    wanted = json.loads(json.dumps(asdict(config.features)))
+    lines = differences(prior.parameters["features"], wanted)
+    if lines:
+        raise PriorError(
+            "The prior's features are not those of the configuration",
+            where=prior.path,
+            found="; ".join(lines),
+            fix="build the prior anew, or use the configuration that it was built for",
+        )
+    if config.hypotheses is not None and "distances" not in prior.parameters:
+        raise no_distances(prior.path)
+
+
+def no_distances(where: object) -> PriorError:
+    """The message for a prior, or an object of one, that an older brrp built."""
+    return PriorError(
+        "The prior holds no distances to its objects' surfaces",
+        where=where,
+        expected="a prior of this version of brrp",
+        found="one that an older brrp built",
+        fix="run brrp build-prior MESHES --overwrite, or pass --preset paper",
+    )
