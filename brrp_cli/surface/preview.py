@@ -27,7 +27,7 @@ CAPTION = 28
 INK = (30, 30, 30)
 IMAGE_UP = np.array([0.0, -1.0, 0.0])
 NOT_STORED = "none of them"
-LEAST = 0.005  # weights and probabilities that are not 0.00 when they are read
+LEAST = 0.005  # of weights and probabilities: less reads as 0.00
 
 
 def preview(
@@ -134,15 +134,18 @@ def _listing(objects: Sequence[ObjectReconstruction], shape: tuple[int, int]) ->
 
 def _told(item: ObjectReconstruction) -> tuple[str, str]:
     first = f"{item.object_id}: {item.status}"
-    weights = [(r.name, r.weight) for r in item.retrieved if r.weight is not None]
+    weights = [(r.weight, r.name) for r in item.retrieved if r.weight is not None]
     if weights:
-        weights.append((NOT_STORED, item.unknown_weight or 0.0))
-        counting = [f"{name} {weight:.2f}" for name, weight in weights if weight >= LEAST]
-        first += f"; weights {', '.join(counting)}"
-    retrieved = [f"{r.name} {r.probability:.2f}" for r in item.retrieved]
-    if item.retrieved and item.unknown_probability >= LEAST:
-        retrieved.append(f"{NOT_STORED} {item.unknown_probability:.2f}")
-    return first, ", ".join(retrieved) or item.message
+        first += f"; weights {_ranked(weights, item.unknown_weight or 0.0)}"
+    shares = [(r.probability, r.name) for r in item.retrieved]
+    return first, _ranked(shares, item.unknown_probability) if shares else item.message
+
+
+def _ranked(shares: list[tuple[float, str]], none: float) -> str:
+    """Names with their shares, largest first: the largest, and what is at least LEAST."""
+    ranked = sorted([*shares, (none, NOT_STORED)], key=lambda each: -each[0])
+    told = [each for each in ranked if each[0] >= LEAST] or ranked[:1]
+    return ", ".join(f"{name} {share:.2f}" for share, name in told)
 
 
 def _with_scale(panel: Picture, top: float, label: str) -> Picture:
