@@ -11,6 +11,7 @@ from brrp_cli.files import sha256_file
 from brrp_cli.prior.descriptions import describe, read_descriptions
 from brrp_cli.prior.find import MeshSource, find_meshes
 from brrp_cli.prior.guard import only_builder, sigterm_is_ctrl_c
+from brrp_cli.prior.index import read_index
 from brrp_cli.prior.make import make_object
 from brrp_cli.prior.manifest import (
     FILE,
@@ -89,6 +90,8 @@ def build_prior(
             )
         if before is None or before.as_bytes() != manifest.as_bytes():
             write_manifest(out, manifest)
+        # Now, so that not the first to open the prior pays for it.
+        read_index(out)
         _sweep(out, manifest)
     names = {entry.name for entry in manifest.objects}
     return BuildReport(
@@ -264,5 +267,5 @@ def _sweep(out: Path, manifest: Manifest) -> None:
     ]:
         if path not in listed:
             path.unlink(missing_ok=True)
-    for path in out.glob(".manifest.*.partial.json"):
+    for path in out.glob(".manifest.*.partial.*"):
         path.unlink(missing_ok=True)

@@ -58,34 +58,41 @@ def is_whole(folder: Path, entry: ShardEntry) -> bool:
     )
 
 
-def read_sidecar(folder: Path, manifest: Manifest) -> NDArray[Any] | None:
-    """A row for each object: `colour` (v, COLOUR_BINS) and `pairs` (v, PAIR_BINS) uint8, `sizes`
-    (r, 3) float32, NaN where an object has fewer poses. None for a prior of an older brrp.
+def read_sidecar(
+    folder: Path, entry: ShardEntry, parameters: dict[str, Any], count: int
+) -> NDArray[Any]:
+    """A row for each of `count` objects, from a file that is whole: `colour` (v, COLOUR_BINS) and
+    `pairs` (v, PAIR_BINS) uint8, `sizes` (r, 3) float32, NaN where an object has fewer poses.
 
-    A file that is missing or damaged is made again; in memory, where the folder cannot be written.
-    Errors: PriorError if the shards have other descriptors than the manifest says.
+    Errors: PriorError.
     """
-    entry = manifest.appearance
-    if entry is None:
-        return None
     path = folder / entry.file
-    if not is_whole(folder, entry):
-        log.warning("%s is missing or damaged; it is made again from the shards", path)
-        try:
-            made = write_sidecar(folder, manifest.objects, manifest.parameters)
-        except OutputError:
-            table = np.zeros(len(manifest.objects), _row_type(manifest.parameters))
-            _fill(table, folder, manifest.objects)
-            return table
-        if made != entry:
-            raise damaged(path, "descriptors that are not those that the manifest vouches for")
     try:
         table = np.load(path, mmap_mode="r", allow_pickle=False)
     except (OSError, ValueError) as error:
         raise damaged(path, error) from error
-    if table.dtype != _row_type(manifest.parameters) or len(table) != len(manifest.objects):
+    if table.dtype != _row_type(parameters) or len(table) != count:
         raise damaged(path, f"{table.dtype}, {table.shape}")
     return np.asanyarray(table)
+
+
+def restore_sidecar(folder: Path, manifest: Manifest) -> NDArray[Any]:
+    """The same where the file is missing or damaged: it is made again; in memory, where the folder
+    cannot be written. Errors: PriorError if the shards have other descriptors than the manifest
+    says."""
+    entry = manifest.appearance
+    assert entry is not None
+    path = folder / entry.file
+    log.warning("%s is missing or damaged; it is made again from the shards", path)
+    try:
+        made = write_sidecar(folder, manifest.objects, manifest.parameters)
+    except OutputError:
+        table = np.zeros(len(manifest.objects), _row_type(manifest.parameters))
+        _fill(table, folder, manifest.objects)
+        return table
+    if made != entry:
+        raise damaged(path, "descriptors that are not those that the manifest vouches for")
+    return read_sidecar(folder, entry, manifest.parameters, len(manifest.objects))
 
 
 def _row_type(parameters: dict[str, Any]) -> np.dtype[Any]:

@@ -74,13 +74,9 @@ def embed_descriptions(
 
 def clip_retriever(prior: Prior, folder: Path) -> ClipRetriever:
     """CLIP over the objects of a prior, with which the text embeddings are kept."""
-    return ClipRetriever(folder, _descriptions(prior), KeepIn(prior.path, prior.digest))
+    return ClipRetriever(folder, prior.phrases, KeepIn(prior.path, prior.digest))
 
 
 def keep_descriptions(prior: Prior, folder: Path) -> None:
     """Keep the embeddings of a prior's descriptions with it, unless they are there already."""
-    embed_descriptions(folder, _descriptions(prior), KeepIn(prior.path, prior.digest))
-
-
-def _descriptions(prior: Prior) -> list[str]:
-    return [prior.descriptions[name] for name in prior.names]
+    embed_descriptions(folder, prior.phrases, KeepIn(prior.path, prior.digest))
