@@ -29,7 +29,15 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from brrp_cli.errors import BrrpError, PriorError
 from brrp_cli.files import atomic_folder, sha256_file
-from brrp_cli.prior.manifest import FILE, ObjectEntry, ShardEntry, write_manifest
+from brrp_cli.prior.index import read_index
+from brrp_cli.prior.looks import open_looks
+from brrp_cli.prior.manifest import (
+    FILE,
+    ObjectEntry,
+    ShardEntry,
+    read_manifest,
+    write_manifest,
+)
 from brrp_cli.prior.plan import MEAN_OBJECTS, shard_file
 from brrp_cli.prior.sidecar import sidecar_file
 from brrp_cli.prior.store import Prior, open_prior
@@ -64,6 +72,7 @@ def main(prior_path: Path, objects: int, output: Path, overwrite: bool) -> None:
 def copy_prior(prior: Prior, count: int, folder: Path) -> None:
     """Write all of it into an empty folder."""
     manifest = prior.manifest
+    assert prior.appearance is not None
     (folder / "shards").mkdir()
     for shard in manifest.shards:
         shutil.copyfile(prior.path / shard.file, folder / shard.file)
@@ -74,7 +83,7 @@ def copy_prior(prior: Prior, count: int, folder: Path) -> None:
     file = sidecar_file(objects, prior.parameters)
     write_rows(
         folder / file,
-        np.asarray(prior.appearance),
+        prior.appearance.rows(np.arange(len(prior.names))),
         np.array([rows[entry.name.split(".copy-")[0]] for entry in objects]),
         np.array([entry.name not in rows for entry in objects]),
     )
@@ -88,6 +97,8 @@ def copy_prior(prior: Prior, count: int, folder: Path) -> None:
             appearance=ShardEntry(file, sha256_file(path), path.stat().st_size),
         ),
     )
+    # What a build leaves too.
+    open_looks(folder, read_index(folder), lambda: read_manifest(folder))
 
 
 def _copies(objects: list[ObjectEntry]) -> Iterator[tuple[ObjectEntry, ObjectEntry]]:

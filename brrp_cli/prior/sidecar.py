@@ -42,7 +42,7 @@ def write_sidecar(
     file = sidecar_file(objects, parameters)
     with atomic_path(folder / file) as partial:
         table = np.lib.format.open_memmap(
-            partial, mode="w+", dtype=_row_type(parameters), shape=(len(objects),)
+            partial, mode="w+", dtype=row_type(parameters), shape=(len(objects),)
         )
         _fill(table, folder, objects)
         table.flush()
@@ -52,10 +52,13 @@ def write_sidecar(
 
 def is_whole(folder: Path, entry: ShardEntry) -> bool:
     """Whether the file is there with the bytes that the manifest vouches for."""
+    return has_size(folder, entry) and sha256_file(folder / entry.file) == entry.sha256
+
+
+def has_size(folder: Path, entry: ShardEntry) -> bool:
+    """Whether the file is there with as many bytes as the manifest says."""
     path = folder / entry.file
-    return (
-        path.is_file() and path.stat().st_size == entry.bytes and sha256_file(path) == entry.sha256
-    )
+    return path.is_file() and path.stat().st_size == entry.bytes
 
 
 def read_sidecar(
@@ -71,7 +74,7 @@ def read_sidecar(
         table = np.load(path, mmap_mode="r", allow_pickle=False)
     except (OSError, ValueError) as error:
         raise damaged(path, error) from error
-    if table.dtype != _row_type(parameters) or len(table) != count:
+    if table.dtype != row_type(parameters) or len(table) != count:
         raise damaged(path, f"{table.dtype}, {table.shape}")
     return np.asanyarray(table)
 
@@ -87,7 +90,7 @@ def restore_sidecar(folder: Path, manifest: Manifest) -> NDArray[Any]:
     try:
         made = write_sidecar(folder, manifest.objects, manifest.parameters)
     except OutputError:
-        table = np.zeros(len(manifest.objects), _row_type(manifest.parameters))
+        table = np.zeros(len(manifest.objects), row_type(manifest.parameters))
         _fill(table, folder, manifest.objects)
         return table
     if made != entry:
@@ -95,7 +98,8 @@ def restore_sidecar(folder: Path, manifest: Manifest) -> NDArray[Any]:
     return read_sidecar(folder, entry, manifest.parameters, len(manifest.objects))
 
 
-def _row_type(parameters: dict[str, Any]) -> np.dtype[Any]:
+def row_type(parameters: dict[str, Any]) -> np.dtype[Any]:
+    """What a row holds. Errors: PriorError if the parameters do not tell."""
     try:
         views = int(parameters["appearance"]["views"])
         poses = int(parameters["poses"]["max_count"])

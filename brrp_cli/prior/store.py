@@ -9,11 +9,10 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from numpy.typing import NDArray
-
 from brrp_cli.errors import BrrpError, PriorError
 from brrp_cli.files import sha256_file
 from brrp_cli.prior.index import Index, read_index
+from brrp_cli.prior.looks import Looks, open_looks
 from brrp_cli.prior.manifest import (
     FILE,
     Manifest,
@@ -25,7 +24,7 @@ from brrp_cli.prior.manifest import (
 from brrp_cli.prior.objects import PriorObject
 from brrp_cli.prior.pack import unpack
 from brrp_cli.prior.shard import damaged, object_names, open_shard, read_stored
-from brrp_cli.prior.sidecar import is_whole, read_sidecar, restore_sidecar
+from brrp_cli.prior.sidecar import is_whole
 
 
 @dataclass
@@ -74,15 +73,10 @@ class Prior:
         return self.index.parameters
 
     @cached_property
-    def appearance(self) -> NDArray[Any] | None:
-        """A row of descriptors for each name (see sidecar.py), mapped into memory; None in a prior
-        of an older brrp. Errors: PriorError."""
-        entry = self.index.appearance
-        if entry is None:
-            return None
-        if not is_whole(self.path, entry):
-            return restore_sidecar(self.path, self.manifest)
-        return read_sidecar(self.path, entry, self.parameters, len(self.names))
+    def appearance(self) -> Looks | None:
+        """What the objects look like, a row for each name (see looks.py); None in a prior of an
+        older brrp. Errors: PriorError."""
+        return open_looks(self.path, self.index, lambda: self.manifest)
 
     @property
     def digest(self) -> str:

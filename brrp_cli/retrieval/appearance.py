@@ -34,16 +34,16 @@ class AppearanceRetriever:
     name = "appearance"
 
     def __init__(self, prior: Prior, config: Config, seed: int) -> None:
-        table = prior.appearance
-        if table is None:
+        looks = prior.appearance
+        if looks is None:
             raise RetrievalError(
                 "The prior does not know what its objects look like",
                 where=prior.path,
                 found="a prior that an older brrp built",
                 fix="run brrp build-prior MESHES --overwrite, or pass --retriever fitness",
             )
-        self._table = table
-        self._shortlist = Shortlist(table)
+        self._looks = looks
+        self._shortlist = Shortlist(looks.first)
         self._config = config
         self._seed = seed
         self._gains = lights()
@@ -56,7 +56,7 @@ class AppearanceRetriever:
         """P(c|R) (n,) for one object of the frame, in the order of the prior's names; sum <= 1."""
         if frame is not self._frame:
             found = self.evidence(frame)
-            answers = believe(list(found.values()), self._light, self._local, len(self._table))
+            answers = believe(list(found.values()), self._light, self._local, len(self._looks))
             self._answers = dict(zip(found, answers, strict=True))
             self._frame = frame
         if object_id not in self._answers:
@@ -76,7 +76,8 @@ class AppearanceRetriever:
             seen = see_object(frame, object_id, plane)
             histograms = lit_histograms(seen, self._gains)
             rows = self._shortlist.rows(seen, histograms)
-            found[object_id] = evidence(seen, histograms, self._table, rows, len(self._gains))
+            stored = self._looks.rows(rows)
+            found[object_id] = evidence(seen, histograms, stored, rows, len(self._gains))
         return found
 
     def plane(self, frame: Frame) -> Plane | None:
