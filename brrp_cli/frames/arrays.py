@@ -80,13 +80,15 @@ def _read_header(stream: IO[bytes], where: str) -> tuple[tuple[int, ...], np.dty
     return shape, dtype
 
 
-def _check_size(shape: tuple[int, ...], dtype: np.dtype[Any], spent: int, where: str) -> int:
+def _check_size(
+    shape: tuple[int, ...], dtype: np.dtype[Any], spent: int, where: str, limit: int = MAX_BYTES
+) -> int:
     total = spent + math.prod(shape) * dtype.itemsize
-    if total > MAX_BYTES:
+    if total > limit:
         raise FrameError(
             "The arrays are too large for one frame",
             where=where,
-            expected=f"at most {MAX_BYTES} bytes in all",
+            expected=f"at most {limit} bytes in all",
             found=f"shape {shape}, dtype {dtype}: {total} bytes",
             fix="crop or downsample the frame, or store float32 and uint8 instead of float64",
         )
@@ -106,14 +108,16 @@ def read_npy(path: Path) -> NDArray[Any]:
         return np.asarray(np.load(path, allow_pickle=False))
 
 
-def read_npz(path: Path, accepted: frozenset[str]) -> tuple[Mapping[str, NDArray[Any]], list[str]]:
+def read_npz(
+    path: Path, accepted: frozenset[str], limit: int = MAX_BYTES
+) -> tuple[Mapping[str, NDArray[Any]], list[str]]:
     """The arrays of an .npz file whose keys are in `accepted`, and the names of all its keys.
 
     Keys that nobody asked for are not read, whatever they hold. Every header is judged before the
     first array is loaded, so that a file that would unpack to much more than a frame is refused
     at once.
 
-    Errors: FrameError if it is missing, damaged, larger than `MAX_BYTES` or holds objects.
+    Errors: FrameError if it is missing, damaged, larger than `limit` bytes or holds objects.
     """
     check_file(path)
     arrays: dict[str, NDArray[Any]] = {}
@@ -132,7 +136,7 @@ def read_npz(path: Path, accepted: frozenset[str]) -> tuple[Mapping[str, NDArray
             where = f"{path}: {key}"
             with _damage_told(where, "a whole .npy member"), archive.open(info) as stream:
                 shape, dtype = _read_header(stream, where)
-                spent = _check_size(shape, dtype, spent, where)
+                spent = _check_size(shape, dtype, spent, where, limit)
         for key, info in wanted.items():
             where = f"{path}: {key}"
             with _damage_told(where, "a whole .npy member"), archive.open(info) as stream:

@@ -11,6 +11,8 @@ from brrp_cli.files import sha256_file
 from brrp_cli.prior.descriptions import describe, read_descriptions
 from brrp_cli.prior.find import MeshSource, find_meshes
 from brrp_cli.prior.guard import only_builder, sigterm_is_ctrl_c
+from brrp_cli.prior.index import read_index
+from brrp_cli.prior.looks import open_looks
 from brrp_cli.prior.make import make_object
 from brrp_cli.prior.manifest import (
     FILE,
@@ -89,6 +91,8 @@ def build_prior(
             )
         if before is None or before.as_bytes() != manifest.as_bytes():
             write_manifest(out, manifest)
+        # Now, so that not the first to open the prior pays for it.
+        open_looks(out, read_index(out), lambda: manifest)
         _sweep(out, manifest)
     names = {entry.name for entry in manifest.objects}
     return BuildReport(
@@ -255,14 +259,15 @@ def _sweep(out: Path, manifest: Manifest) -> None:
     """Delete files that nothing refers to, and what killed runs left half written."""
     listed = {out / shard.file for shard in manifest.shards}
     if manifest.appearance is not None:
-        listed.add(out / manifest.appearance.file)
+        path = out / manifest.appearance.file
+        listed |= {path, path.with_suffix(".npz")}
     for path in [
         *(out / "shards").glob("shard-*.h5"),
         *(out / "shards").glob(".shard-*.partial.h5"),
-        *out.glob("appearance-*.npy"),
-        *out.glob(".appearance-*.partial.npy"),
+        *out.glob("appearance-*.np[yz]"),
+        *out.glob(".appearance-*.partial.np[yz]"),
     ]:
         if path not in listed:
             path.unlink(missing_ok=True)
-    for path in out.glob(".manifest.*.partial.json"):
+    for path in out.glob(".manifest.*.partial.*"):
         path.unlink(missing_ok=True)

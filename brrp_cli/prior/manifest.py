@@ -9,7 +9,6 @@ give the same bytes.
 
 from __future__ import annotations
 
-import hashlib
 import json
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -60,7 +59,7 @@ class Failure:
 
 @dataclass(frozen=True)
 class Manifest:
-    """The whole of it. `digest`: sha256 of the file's bytes."""
+    """The whole of it."""
 
     parameters: dict[str, Any]
     objects: list[ObjectEntry]
@@ -93,11 +92,6 @@ class Manifest:
                 met.setdefault(library, set()).add(version)
         return {library: sorted(versions) for library, versions in sorted(met.items())}
 
-    @property
-    def digest(self) -> str:
-        """sha256 of the manifest, and with it of all that it vouches for."""
-        return hashlib.sha256(self.as_bytes()).hexdigest()
-
 
 def write_manifest(folder: Path, manifest: Manifest) -> None:
     """Commit."""
@@ -107,6 +101,11 @@ def write_manifest(folder: Path, manifest: Manifest) -> None:
 def read_manifest(folder: Path) -> Manifest:
     """Read and check. Errors: PriorError for a folder that is no prior, a manifest that cannot be
     read, is of a newer schema, or names a file outside of the prior."""
+    return parse_manifest(read_bytes(folder), folder / FILE)
+
+
+def read_bytes(folder: Path) -> bytes:
+    """The manifest's bytes. Errors: PriorError for a folder that is no prior or cannot be read."""
     path = folder / FILE
     if not path.is_file():
         raise PriorError(
@@ -116,7 +115,15 @@ def read_manifest(folder: Path) -> Manifest:
             fix="make one: brrp build-prior MESHES/ -o PRIOR/",
         )
     try:
-        table = json.loads(path.read_text(encoding="utf-8"))
+        return path.read_bytes()
+    except OSError as error:
+        raise _unusable(path, error) from error
+
+
+def parse_manifest(data: bytes, path: Path) -> Manifest:
+    """The manifest with these bytes, checked; `path` is for messages. Errors: PriorError."""
+    try:
+        table = json.loads(data.decode("utf-8"))
         _refuse_foreign(table, path)
         manifest = Manifest(
             parameters=dict(table["parameters"]),
@@ -125,15 +132,20 @@ def read_manifest(folder: Path) -> Manifest:
             failed=[Failure(**entry) for entry in table["failed"]],
             appearance=ShardEntry(**table["appearance"]) if "appearance" in table else None,
         )
-        _check(manifest)
-    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
-        raise PriorError(
-            "The prior's manifest cannot be used",
-            where=path,
-            found=f"{type(error).__name__}: {error}",
-            fix="restore the file, or run brrp build-prior again; finished shards are kept",
-        ) from error
+        check_files(manifest.shards, manifest.appearance)
+        _check_objects(manifest)
+    except (ValueError, KeyError, TypeError, AttributeError) as error:
+        raise _unusable(path, error) from error
     return manifest
+
+
+def _unusable(path: Path, error: Exception) -> PriorError:
+    return PriorError(
+        "The prior's manifest cannot be used",
+        where=path,
+        found=f"{type(error).__name__}: {error}",
+        fix="restore the file, or run brrp build-prior again; finished shards are kept",
+    )
 
 
 def _refuse_foreign(table: dict[str, Any], path: Path) -> None:
@@ -154,16 +166,20 @@ def _refuse_foreign(table: dict[str, Any], path: Path) -> None:
         )
 
 
-def _check(manifest: Manifest) -> None:
-    files = [entry.file for entry in manifest.shards]
-    for file in files:
-        if not SHARD_NAME.fullmatch(file):
-            raise ValueError(f"a shard named {file!r}")
-    if manifest.appearance and not APPEARANCE_NAME.fullmatch(manifest.appearance.file):
-        raise ValueError(f"a file of descriptors named {manifest.appearance.file!r}")
-    names = [entry.name for entry in manifest.objects]
-    if len(set(names)) < len(names):
+def check_files(shards: list[ShardEntry], appearance: ShardEntry | None) -> None:
+    """ValueError for a file that is not where and how a prior keeps its files."""
+    for shard in shards:
+        if not SHARD_NAME.fullmatch(shard.file):
+            raise ValueError(f"a shard named {shard.file!r}")
+    if appearance and not APPEARANCE_NAME.fullmatch(appearance.file):
+        raise ValueError(f"a file of descriptors named {appearance.file!r}")
+
+
+def _check_objects(manifest: Manifest) -> None:
+    names = {entry.name for entry in manifest.objects}
+    if len(names) < len(manifest.objects):
         raise ValueError("an object that stands there twice")
+    files = {shard.file for shard in manifest.shards}
     for entry in manifest.objects:
         if entry.shard not in files:
             raise ValueError(f"{entry.name} lies in {entry.shard!r}, which is not listed")

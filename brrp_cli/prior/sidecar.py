@@ -42,7 +42,7 @@ def write_sidecar(
     file = sidecar_file(objects, parameters)
     with atomic_path(folder / file) as partial:
         table = np.lib.format.open_memmap(
-            partial, mode="w+", dtype=_row_type(parameters), shape=(len(objects),)
+            partial, mode="w+", dtype=row_type(parameters), shape=(len(objects),)
         )
         _fill(table, folder, objects)
         table.flush()
@@ -52,43 +52,54 @@ def write_sidecar(
 
 def is_whole(folder: Path, entry: ShardEntry) -> bool:
     """Whether the file is there with the bytes that the manifest vouches for."""
+    return has_size(folder, entry) and sha256_file(folder / entry.file) == entry.sha256
+
+
+def has_size(folder: Path, entry: ShardEntry) -> bool:
+    """Whether the file is there with as many bytes as the manifest says."""
     path = folder / entry.file
-    return (
-        path.is_file() and path.stat().st_size == entry.bytes and sha256_file(path) == entry.sha256
-    )
+    return path.is_file() and path.stat().st_size == entry.bytes
 
 
-def read_sidecar(folder: Path, manifest: Manifest) -> NDArray[Any] | None:
-    """A row for each object: `colour` (v, COLOUR_BINS) and `pairs` (v, PAIR_BINS) uint8, `sizes`
-    (r, 3) float32, NaN where an object has fewer poses. None for a prior of an older brrp.
+def read_sidecar(
+    folder: Path, entry: ShardEntry, parameters: dict[str, Any], count: int
+) -> NDArray[Any]:
+    """A row for each of `count` objects, from a file that is whole: `colour` (v, COLOUR_BINS) and
+    `pairs` (v, PAIR_BINS) uint8, `sizes` (r, 3) float32, NaN where an object has fewer poses.
 
-    A file that is missing or damaged is made again; in memory, where the folder cannot be written.
-    Errors: PriorError if the shards have other descriptors than the manifest says.
+    Errors: PriorError.
     """
-    entry = manifest.appearance
-    if entry is None:
-        return None
     path = folder / entry.file
-    if not is_whole(folder, entry):
-        log.warning("%s is missing or damaged; it is made again from the shards", path)
-        try:
-            made = write_sidecar(folder, manifest.objects, manifest.parameters)
-        except OutputError:
-            table = np.zeros(len(manifest.objects), _row_type(manifest.parameters))
-            _fill(table, folder, manifest.objects)
-            return table
-        if made != entry:
-            raise damaged(path, "descriptors that are not those that the manifest vouches for")
     try:
         table = np.load(path, mmap_mode="r", allow_pickle=False)
     except (OSError, ValueError) as error:
         raise damaged(path, error) from error
-    if table.dtype != _row_type(manifest.parameters) or len(table) != len(manifest.objects):
+    if table.dtype != row_type(parameters) or len(table) != count:
         raise damaged(path, f"{table.dtype}, {table.shape}")
     return np.asanyarray(table)
 
 
-def _row_type(parameters: dict[str, Any]) -> np.dtype[Any]:
+def restore_sidecar(folder: Path, manifest: Manifest) -> NDArray[Any]:
+    """The same where the file is missing or damaged: it is made again; in memory, where the folder
+    cannot be written. Errors: PriorError if the shards have other descriptors than the manifest
+    says."""
+    entry = manifest.appearance
+    assert entry is not None
+    path = folder / entry.file
+    log.warning("%s is missing or damaged; it is made again from the shards", path)
+    try:
+        made = write_sidecar(folder, manifest.objects, manifest.parameters)
+    except OutputError:
+        table = np.zeros(len(manifest.objects), row_type(manifest.parameters))
+        _fill(table, folder, manifest.objects)
+        return table
+    if made != entry:
+        raise damaged(path, "descriptors that are not those that the manifest vouches for")
+    return read_sidecar(folder, entry, manifest.parameters, len(manifest.objects))
+
+
+def row_type(parameters: dict[str, Any]) -> np.dtype[Any]:
+    """What a row holds. Errors: PriorError if the parameters do not tell."""
     try:
         views = int(parameters["appearance"]["views"])
         poses = int(parameters["poses"]["max_count"])

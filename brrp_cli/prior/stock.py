@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import json
 import logging
+from collections import defaultdict
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from brrp_cli.errors import PriorError
-from brrp_cli.prior.manifest import Manifest
+from brrp_cli.prior.manifest import Manifest, ObjectEntry
 from brrp_cli.prior.shard import object_names, open_shard, read_stored
 from brrp_cli.prior.store import check_bytes
 
@@ -37,6 +38,9 @@ def take_stock(folder: Path, manifest: Manifest | None, parameters: dict[str, An
     stock: Stock = {}
     listed = set()
     if manifest is not None and manifest.parameters == parameters:
+        members: defaultdict[str, list[ObjectEntry]] = defaultdict(list)
+        for entry in manifest.objects:
+            members[entry.shard].append(entry)
         for shard in manifest.shards:
             listed.add(shard.file)
             try:
@@ -44,10 +48,8 @@ def take_stock(folder: Path, manifest: Manifest | None, parameters: dict[str, An
             except PriorError as error:
                 log.warning("%s: %s; its objects are made again", shard.file, error.what)
                 continue
-            for entry in manifest.objects:
-                if entry.shard == shard.file:
-                    key = (entry.name, entry.input_sha256)
-                    stock[key] = Finished(shard.file, entry.record)
+            for entry in members[shard.file]:
+                stock[entry.name, entry.input_sha256] = Finished(shard.file, entry.record)
     for path in sorted((folder / "shards").glob("shard-*.h5")):
         file = f"shards/{path.name}"
         if file not in listed:

@@ -2,20 +2,29 @@
 
 from __future__ import annotations
 
+import hashlib
+from collections import defaultdict
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from numpy.typing import NDArray
-
-from brrp_cli.errors import BrrpError
+from brrp_cli.errors import BrrpError, PriorError
 from brrp_cli.files import sha256_file
-from brrp_cli.prior.manifest import Manifest, ObjectEntry, ShardEntry, read_manifest
+from brrp_cli.prior.index import Index, read_index
+from brrp_cli.prior.looks import Looks, open_looks
+from brrp_cli.prior.manifest import (
+    FILE,
+    Manifest,
+    ObjectEntry,
+    ShardEntry,
+    parse_manifest,
+    read_bytes,
+)
 from brrp_cli.prior.objects import PriorObject
 from brrp_cli.prior.pack import unpack
 from brrp_cli.prior.shard import damaged, object_names, open_shard, read_stored
-from brrp_cli.prior.sidecar import is_whole, read_sidecar
+from brrp_cli.prior.sidecar import is_whole
 
 
 @dataclass
@@ -24,20 +33,36 @@ class Prior:
     the manifest's sha256 before the first byte of theirs is used."""
 
     path: Path
-    manifest: Manifest
+    index: Index
     _checked: set[str] = field(default_factory=set, repr=False)
+
+    @cached_property
+    def manifest(self) -> Manifest:
+        """All that is known of the objects. Errors: PriorError, also if it is another one by now
+        than that which was opened."""
+        data = read_bytes(self.path)
+        if hashlib.sha256(data).hexdigest() != self.digest:
+            raise PriorError(
+                "The prior was built again meanwhile", where=self.path, fix="open the prior again"
+            )
+        return parse_manifest(data, self.path / FILE)
 
     @property
     def names(self) -> list[str]:
         """Names of the objects, sorted."""
-        return [entry.name for entry in self.manifest.objects]
+        return self.index.names
 
     @property
+    def phrases(self) -> list[str]:
+        """Phrases for CLIP, in the order of the names."""
+        return self.index.descriptions
+
+    @cached_property
     def descriptions(self) -> dict[str, str]:
         """Name -> phrase for CLIP."""
-        return {entry.name: entry.description for entry in self.manifest.objects}
+        return dict(zip(self.names, self.phrases, strict=True))
 
-    @property
+    @cached_property
     def entries(self) -> dict[str, ObjectEntry]:
         """Name -> what the manifest says of the object."""
         return {entry.name: entry for entry in self.manifest.objects}
@@ -45,34 +70,34 @@ class Prior:
     @property
     def parameters(self) -> dict[str, Any]:
         """What the prior was built with: seed, samples, mix, features, ..."""
-        return self.manifest.parameters
+        return self.index.parameters
 
     @cached_property
-    def appearance(self) -> NDArray[Any] | None:
-        """A row of descriptors for each name (see sidecar.py), mapped into memory; None in a prior
-        of an older brrp. Errors: PriorError."""
-        return read_sidecar(self.path, self.manifest)
+    def appearance(self) -> Looks | None:
+        """What the objects look like, a row for each name (see looks.py); None in a prior of an
+        older brrp. Errors: PriorError."""
+        return open_looks(self.path, self.index, lambda: self.manifest)
 
     @property
     def digest(self) -> str:
-        """sha256 that names this prior and no other."""
-        return self.manifest.digest
+        """sha256 of the manifest, and with it of all that it vouches for."""
+        return self.index.digest
 
     def load(self, name: str) -> PriorObject:
         """Read one object. Errors: KeyError for an unknown name, PriorError for a bad shard."""
-        entry = self.entries[name]
-        if entry.shard not in self._checked:
-            shard = next(s for s in self.manifest.shards if s.file == entry.shard)
+        row = self.index.rows[name]
+        shard = self.index.shards[self.index.shard_of[row]]
+        if shard.file not in self._checked:
             check_bytes(self.path, shard)
-            self._checked.add(entry.shard)
-        with open_shard(self.path / entry.shard) as file:
-            return unpack(read_stored(file, name), entry.description)
+            self._checked.add(shard.file)
+        with open_shard(self.path / shard.file) as file:
+            return unpack(read_stored(file, name), self.phrases[row])
 
 
 def open_prior(path: str | Path) -> Prior:
     """Open the prior in a folder. Errors: PriorError."""
     folder = Path(path)
-    return Prior(folder, read_manifest(folder))
+    return Prior(folder, read_index(folder))
 
 
 def check_bytes(folder: Path, shard: ShardEntry) -> None:
@@ -91,8 +116,11 @@ def check_bytes(folder: Path, shard: ShardEntry) -> None:
 def verify_prior(prior: Prior) -> list[str]:
     """Read everything; one line for each problem, none if all is well."""
     problems = []
+    members: defaultdict[str, dict[str, ObjectEntry]] = defaultdict(dict)
+    for entry in prior.manifest.objects:
+        members[entry.shard][entry.name] = entry
     for shard in prior.manifest.shards:
-        entries = {e.name: e for e in prior.manifest.objects if e.shard == shard.file}
+        entries = members[shard.file]
         try:
             check_bytes(prior.path, shard)
             with open_shard(prior.path / shard.file) as file:

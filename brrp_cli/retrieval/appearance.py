@@ -8,8 +8,6 @@ object. The constants that turn likeness into probability are in belief.py.
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -18,6 +16,7 @@ from brrp_cli.errors import RetrievalError
 from brrp_cli.frames.frame import BACKGROUND, Frame
 from brrp_cli.frames.observe import box_center
 from brrp_cli.frames.plane import Plane, fit_plane
+from brrp_cli.prior.looks import Looks
 from brrp_cli.prior.store import Prior
 from brrp_cli.retrieval.belief import Evidence, believe
 from brrp_cli.retrieval.lights import lights, local_lights, log_prior
@@ -26,17 +25,17 @@ from brrp_cli.retrieval.seen import see_object
 from brrp_cli.retrieval.shortlist import Shortlist
 
 
-def need_appearance(prior: Prior) -> NDArray[Any]:
-    """The prior's descriptors, a row for each object. Errors: RetrievalError if it has none."""
-    table = prior.appearance
-    if table is None:
+def need_appearance(prior: Prior) -> Looks:
+    """The prior's descriptors. Errors: RetrievalError if it has none."""
+    looks = prior.appearance
+    if looks is None:
         raise RetrievalError(
             "The prior does not know what its objects look like",
             where=prior.path,
             found="a prior that an older brrp built",
             fix="run brrp build-prior MESHES --overwrite, or pass --retriever fitness",
         )
-    return table
+    return looks
 
 
 class AppearanceRetriever:
@@ -49,9 +48,8 @@ class AppearanceRetriever:
     name = "appearance"
 
     def __init__(self, prior: Prior, config: Config, seed: int) -> None:
-        table = need_appearance(prior)
-        self._table = table
-        self._shortlist = Shortlist(table)
+        self._looks = need_appearance(prior)
+        self._shortlist = Shortlist(self._looks.first)
         self._config = config
         self._seed = seed
         self._gains = lights()
@@ -64,7 +62,7 @@ class AppearanceRetriever:
         """P(c|R) (n,) for one object of the frame, in the order of the prior's names; sum <= 1."""
         if frame is not self._frame:
             found = self.evidence(frame)
-            answers = believe(list(found.values()), self._light, self._local, len(self._table))
+            answers = believe(list(found.values()), self._light, self._local, len(self._looks))
             self._answers = dict(zip(found, answers, strict=True))
             self._frame = frame
         if object_id not in self._answers:
@@ -84,7 +82,8 @@ class AppearanceRetriever:
             seen = see_object(frame, object_id, plane)
             histograms = lit_histograms(seen, self._gains)
             rows = self._shortlist.rows(seen, histograms)
-            found[object_id] = evidence(seen, histograms, self._table, rows, len(self._gains))
+            stored = self._looks.rows(rows)
+            found[object_id] = evidence(seen, histograms, stored, rows, len(self._gains))
         return found
 
     def plane(self, frame: Frame) -> Plane | None:

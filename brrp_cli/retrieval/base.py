@@ -7,6 +7,7 @@ is seen of one object can stand in.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from heapq import nsmallest
 from typing import Protocol
 
 import numpy as np
@@ -49,7 +50,18 @@ def top_k(
     """The k most probable objects, most probable first, as (name, probability).
 
     Equal probabilities go in the order of names, so that the choice never hangs on the sorting
-    routine. A k beyond the prior's size gives all of its objects.
+    routine. A k beyond the prior's size gives all of its objects. Only the best are sorted.
     """
-    ranked = sorted(zip(names, map(float, probabilities), strict=True), key=lambda t: (-t[1], t[0]))
-    return ranked[:k]
+    if len(probabilities) != len(names):
+        raise ValueError(f"{len(probabilities)} probabilities for {len(names)} objects")
+    values = np.asarray(probabilities, dtype=np.float64)
+    k = min(k, len(values))
+    if k < 1:
+        return []
+    least = float(np.partition(values, -k)[-k])
+    above, ties = (np.flatnonzero(found).tolist() for found in (values > least, values == least))
+    better = sorted(
+        ((names[row], float(values[row])) for row in above), key=lambda t: (-t[1], t[0])
+    )
+    equal = nsmallest(k - len(better), (names[row] for row in ties))
+    return sorted(better, key=lambda t: (-t[1], t[0])) + [(name, least) for name in equal]

@@ -25,7 +25,7 @@ def resolve_name(name: str, clip_dir: Path | None = None, prior: Prior | None = 
         return name
     if clip_folder(clip_dir):
         return "clip"
-    return "appearance" if prior is None or prior.manifest.appearance else "fitness"
+    return "appearance" if prior is None or prior.index.appearance else "fitness"
 
 
 def choose_retriever(

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from brrp_cli.errors import BrrpError, OutputError, RetrievalError
 from brrp_cli.files import atomic_path, sha256_file
-from brrp_cli.frames.arrays import read_npz
+from brrp_cli.frames.arrays import MAX_BYTES, read_npz
 from brrp_cli.retrieval.clip_files import ClipFiles, find_clip_files, find_clip_parts
 from brrp_cli.retrieval.clip_manifest import known_pair, refuse_mismatch
 from brrp_cli.retrieval.clip_text import ClipTokenizer
@@ -30,6 +30,8 @@ from brrp_cli.retrieval.clip_tower import Tower
 
 FOLDER = "clip"
 _TOLD = ("prior", "prompts_sha256", "text_sha256", "vision_sha256")
+# Bytes of one embedding that is kept; CLIP ViT-B/16 has 2048.
+_MAX_ROW = 2**13
 
 log = logging.getLogger(__name__)
 
@@ -123,7 +125,8 @@ def _read(path: Path, keep: KeepIn, prompts: Sequence[str]) -> tuple[TextEmbeddi
     """The embeddings and the sha256 of the vision model they were made beside; None where the file
     is of another prior, of other prompts, or damaged."""
     try:
-        arrays, _ = read_npz(path, frozenset({"vectors", *_TOLD}))
+        limit = max(MAX_BYTES, _MAX_ROW * len(prompts))
+        arrays, _ = read_npz(path, frozenset({"vectors", *_TOLD}), limit)
         told = {name: str(arrays[name]) for name in _TOLD}
         vectors = arrays["vectors"]
     except (BrrpError, KeyError):

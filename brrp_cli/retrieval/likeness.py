@@ -69,12 +69,11 @@ def size_penalty(
 def evidence(
     seen: SeenObject,
     histograms: NDArray[np.floating] | None,
-    table: NDArray[Any],
+    stored: NDArray[Any],
     rows: NDArray[np.int64],
     lights: int,
 ) -> Evidence:
-    """All of it for the rows (m,) of a prior's table of descriptors."""
-    stored = table[rows]
+    """All of it for stored descriptors (m,), which are those of the rows (m,) of the prior."""
     return Evidence(
         rows=rows,
         colour=colour_likeness(histograms, stored["colour"], lights),

@@ -22,7 +22,8 @@ def sidecar(folder: Path) -> Path:
 def test_a_row_is_what_the_shard_holds(pristine: Path) -> None:
     prior = open_prior(pristine)
     assert prior.appearance is not None and len(prior.appearance) == len(prior.names)
-    for name, row in zip(prior.names, prior.appearance, strict=True):
+    rows = prior.appearance.rows(np.arange(len(prior.names)))
+    for name, row in zip(prior.names, rows, strict=True):
         stored = prior.load(name).appearance
         assert stored is not None
         np.testing.assert_array_equal(row["colour"], stored.colour)
@@ -53,6 +54,9 @@ def test_what_is_missing_or_damaged_is_made_again(prior_folder: Path, harm: str)
     prior = open_prior(prior_folder)
     assert [line for line in verify_prior(prior) if "appearance" in line]
     assert prior.appearance is not None
+    # What has its size is checked where it is read.
+    row = prior.appearance.rows(np.array([2]))
+    assert row.tobytes() == before[-row.nbytes :]
     assert sidecar(prior_folder).read_bytes() == before
     assert verify_prior(open_prior(prior_folder)) == []
 

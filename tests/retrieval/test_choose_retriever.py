@@ -52,7 +52,7 @@ def fetched(xenova: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Pa
 
 def older(prior: Prior) -> Prior:
     """The same prior as a brrp without appearance built it."""
-    return Prior(prior.path, replace(prior.manifest, appearance=None))
+    return Prior(prior.path, replace(prior.index, appearance=None))
 
 
 def test_auto_without_clip_is_appearance_where_the_prior_knows_it(prior: Prior) -> None:

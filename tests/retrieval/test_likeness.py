@@ -4,6 +4,7 @@ import pytest
 from brrp_cli.appearance.colour import COLOUR_BINS
 from brrp_cli.appearance.descriptor import to_bytes
 from brrp_cli.appearance.pairs import PAIR_BINS
+from brrp_cli.prior.looks import first_look
 from brrp_cli.retrieval.belief import NEUTRAL_COLOUR
 from brrp_cli.retrieval.likeness import colour_likeness, pair_likeness, size_penalty
 from brrp_cli.retrieval.seen import SeenObject
@@ -71,7 +72,7 @@ def test_a_shortlist_of_a_large_prior_holds_the_true_object():
     table["colour"] = to_bytes(colour * np.ones((views, 1)))
     table["pairs"] = to_bytes(pairs * np.ones((views, 1)))
     table["sizes"] = rng.uniform(0.02, 0.3, (count, 2, 3))
-    shortlist = Shortlist(table)
+    shortlist = Shortlist(first_look(table))
     for true in (7, 1234, 2999):
         size = table["sizes"][true, 0].astype(float)
         seen = SeenObject(None, None, pairs[true, 0].astype(np.float32), size, 0.0)

@@ -25,3 +25,14 @@ def test_top_k_beyond_the_prior_gives_all_of_it() -> None:
 def test_top_k_refuses_probabilities_of_another_prior() -> None:
     with pytest.raises(ValueError):
         top_k(np.array([1.0]), ["a", "b"], 1)
+
+
+def test_top_k_is_the_head_of_a_sorted_list() -> None:
+    rng = np.random.default_rng(0)
+    for count in (1, 2, 30):
+        names = [f"{number:02d}" for number in rng.permutation(count)]
+        # Few values, so that many are equal, at the last place too.
+        values = rng.integers(4, size=count) / 10
+        ranked = sorted(zip(names, values, strict=True), key=lambda t: (-t[1], t[0]))
+        for k in (0, 1, 3, count, count + 1):
+            assert top_k(values, names, k) == ranked[:k]

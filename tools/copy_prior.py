@@ -1,0 +1,163 @@
+"""Make a prior of many objects out of one of few, to time what a prior's size costs.
+
+    python tools/copy_prior.py --prior prior/ --objects 50000 -o many/
+
+The objects of `prior` stay as they are. Copies have names, entries in the manifest and shards of
+their own, and descriptors that are mixed in pairs and stretched, so that no two are alike; all else
+of a copy is what its original has, to the byte. None of it takes room on the disk but manifest and
+descriptors: in a shard, every name of a copy is a hard link to its original, and so are shards with
+the same content. That is the one difference from a built prior, and `brrp verify` tells of it.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import sys
+from collections.abc import Iterator
+from dataclasses import replace
+from itertools import islice
+from pathlib import Path
+from typing import Any
+
+import click
+import numpy as np
+from numpy.typing import NDArray
+
+# The script also runs from a checkout that is not installed.
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+from brrp_cli.errors import BrrpError, PriorError
+from brrp_cli.files import atomic_folder, sha256_file
+from brrp_cli.prior.index import read_index
+from brrp_cli.prior.looks import open_looks
+from brrp_cli.prior.manifest import (
+    FILE,
+    ObjectEntry,
+    ShardEntry,
+    read_manifest,
+    write_manifest,
+)
+from brrp_cli.prior.plan import MEAN_OBJECTS, shard_file
+from brrp_cli.prior.sidecar import sidecar_file
+from brrp_cli.prior.store import Prior, open_prior
+
+CHUNK = 1_000
+
+
+@click.command()
+@click.option("--prior", "prior_path", required=True, type=click.Path(path_type=Path))
+@click.option("--objects", default=50_000, show_default=True, type=click.IntRange(1))
+@click.option("-o", "--output", required=True, type=click.Path(path_type=Path))
+@click.option("--overwrite", is_flag=True)
+def main(prior_path: Path, objects: int, output: Path, overwrite: bool) -> None:
+    """Make a prior of so many OBJECTS in the folder OUTPUT."""
+    try:
+        prior = open_prior(prior_path)
+        if prior.appearance is None or objects < len(prior.names):
+            raise PriorError(
+                "The prior cannot be copied",
+                where=prior_path,
+                expected=f"descriptors, and at most {objects} objects",
+                found=f"{len(prior.names)} objects",
+            )
+        with atomic_folder(output, overwrite=overwrite, mark=FILE) as folder:
+            copy_prior(prior, objects, folder)
+    except BrrpError as error:
+        raise click.ClickException(str(error)) from error
+    size = (output / FILE).stat().st_size / 1e6
+    click.echo(f"{objects} objects, a manifest of {size:.1f} MB: {output}/")
+
+
+def copy_prior(prior: Prior, count: int, folder: Path) -> None:
+    """Write all of it into an empty folder."""
+    manifest = prior.manifest
+    assert prior.appearance is not None
+    (folder / "shards").mkdir()
+    for shard in manifest.shards:
+        shutil.copyfile(prior.path / shard.file, folder / shard.file)
+    copies = list(islice(_copies(manifest.objects), count - len(manifest.objects)))
+    placed, shards = _place(copies, prior, folder)
+    objects = sorted([*manifest.objects, *placed], key=lambda entry: entry.name)
+    rows = {name: row for row, name in enumerate(prior.names)}
+    file = sidecar_file(objects, prior.parameters)
+    write_rows(
+        folder / file,
+        prior.appearance.rows(np.arange(len(prior.names))),
+        np.array([rows[entry.name.split(".copy-")[0]] for entry in objects]),
+        np.array([entry.name not in rows for entry in objects]),
+    )
+    path = folder / file
+    write_manifest(
+        folder,
+        replace(
+            manifest,
+            objects=objects,
+            shards=sorted([*manifest.shards, *shards], key=lambda entry: entry.file),
+            appearance=ShardEntry(file, sha256_file(path), path.stat().st_size),
+        ),
+    )
+    # What a build leaves too.
+    open_looks(folder, read_index(folder), lambda: read_manifest(folder))
+
+
+def _copies(objects: list[ObjectEntry]) -> Iterator[tuple[ObjectEntry, ObjectEntry]]:
+    """(copy, original) without end, all originals in turn."""
+    number = 0
+    while True:
+        number += 1
+        for entry in objects:
+            yield replace(entry, name=f"{entry.name}.copy-{number:05d}"), entry
+
+
+def _place(
+    copies: list[tuple[ObjectEntry, ObjectEntry]], prior: Prior, folder: Path
+) -> tuple[list[ObjectEntry], list[ShardEntry]]:
+    """The copies, each in a shard, about 8 to a shard, and those shards."""
+    import h5py
+
+    placed, shards = [], []
+    for shard in prior.manifest.shards:
+        members = [pair for pair in copies if pair[1].shard == shard.file]
+        if not members:
+            continue
+        base = folder / "shards" / "base.h5"
+        shutil.copyfile(prior.path / shard.file, base)
+        with h5py.File(base, "r+") as file:
+            for copy, original in members:
+                file[f"objects/{copy.name}"] = file[f"objects/{original.name}"]
+        sha256, size = sha256_file(base), base.stat().st_size
+        for start in range(0, len(members), MEAN_OBJECTS):
+            run = [copy for copy, _ in members[start : start + MEAN_OBJECTS]]
+            name = shard_file(prior.parameters, [(c.name, c.input_sha256) for c in run])
+            os.link(base, folder / name)
+            shards.append(ShardEntry(name, sha256, size))
+            placed += [replace(copy, shard=name) for copy in run]
+        base.unlink()
+    return placed, shards
+
+
+def write_rows(
+    path: Path, source: NDArray[Any], rows: NDArray[np.int64], mixed: NDArray[np.bool_]
+) -> None:
+    """source[rows] (n,); those of `mixed` (n,) are mixed with another row and stretched."""
+    rng = np.random.default_rng(0)
+    table = np.lib.format.open_memmap(path, mode="w+", dtype=source.dtype, shape=rows.shape)
+    for start in range(0, len(rows), CHUNK):
+        here = slice(start, start + CHUNK)
+        one = source[rows[here]]
+        two = source[rng.integers(len(source), size=len(one))]
+        share = rng.random((len(one), 1, 1))
+        made = one.copy()
+        for field in ("colour", "pairs"):
+            squares = (
+                share * one[field].astype(float) ** 2 + (1 - share) * two[field].astype(float) ** 2
+            )
+            made[field] = np.rint(np.sqrt(squares))
+        made["sizes"] = one["sizes"] * rng.uniform(0.5, 1.5, (len(one), 1, 3))
+        table[here] = np.where(mixed[here], made, one)
+    table.flush()
+
+
+if __name__ == "__main__":
+    main()
