@@ -1,3 +1,5 @@
+import logging
+
 import pytest
 
 
@@ -8,3 +10,12 @@ def no_clip_of_the_users(tmp_path_factory: pytest.TempPathFactory):
         patch.setenv("XDG_CACHE_HOME", str(tmp_path_factory.mktemp("cache")))
         patch.delenv("BRRP_CLIP_DIR", raising=False)
         yield
+
+
+@pytest.fixture(autouse=True)
+def log_level_is_restored():
+    """A command that is run in this process sets the level, as with `--quiet`, for good."""
+    root = logging.getLogger()
+    level = root.level
+    yield
+    root.setLevel(level)
