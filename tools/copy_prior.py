@@ -4,9 +4,10 @@
 
 The objects of `prior` stay as they are. Copies have names, entries in the manifest and shards of
 their own, and descriptors that are mixed in pairs and stretched, so that no two are alike; all else
-of a copy is what its original has, to the byte. None of it takes room on the disk but manifest and
-descriptors: in a shard, every name of a copy is a hard link to its original, and so are shards with
-the same content. That is the one difference from a built prior, and `brrp verify` tells of it.
+of a copy is what its original has, to the byte. With --strange the histograms are shuffled besides,
+so that next to none of the copies is retrieved. Only manifest and descriptors take room on the
+disk: in a shard, every name of a copy is a hard link to its original, and so are shards with the
+same content. That is the one difference from a built prior, and `brrp verify` tells of it.
 """
 
 from __future__ import annotations
@@ -49,8 +50,9 @@ CHUNK = 1_000
 @click.option("--prior", "prior_path", required=True, type=click.Path(path_type=Path))
 @click.option("--objects", default=50_000, show_default=True, type=click.IntRange(1))
 @click.option("-o", "--output", required=True, type=click.Path(path_type=Path))
+@click.option("--strange", is_flag=True, help="Copies that look like nothing that is there.")
 @click.option("--overwrite", is_flag=True)
-def main(prior_path: Path, objects: int, output: Path, overwrite: bool) -> None:
+def main(prior_path: Path, objects: int, output: Path, strange: bool, overwrite: bool) -> None:
     """Make a prior of so many OBJECTS in the folder OUTPUT."""
     try:
         prior = open_prior(prior_path)
@@ -62,14 +64,14 @@ def main(prior_path: Path, objects: int, output: Path, overwrite: bool) -> None:
                 found=f"{len(prior.names)} objects",
             )
         with atomic_folder(output, overwrite=overwrite, mark=FILE) as folder:
-            copy_prior(prior, objects, folder)
+            copy_prior(prior, objects, folder, strange)
     except BrrpError as error:
         raise click.ClickException(str(error)) from error
     size = (output / FILE).stat().st_size / 1e6
     click.echo(f"{objects} objects, a manifest of {size:.1f} MB: {output}/")
 
 
-def copy_prior(prior: Prior, count: int, folder: Path) -> None:
+def copy_prior(prior: Prior, count: int, folder: Path, strange: bool) -> None:
     """Write all of it into an empty folder."""
     manifest = prior.manifest
     assert prior.appearance is not None
@@ -86,6 +88,7 @@ def copy_prior(prior: Prior, count: int, folder: Path) -> None:
         prior.appearance.rows(np.arange(len(prior.names))),
         np.array([rows[entry.name.split(".copy-")[0]] for entry in objects]),
         np.array([entry.name not in rows for entry in objects]),
+        strange,
     )
     path = folder / file
     write_manifest(
@@ -138,9 +141,14 @@ def _place(
 
 
 def write_rows(
-    path: Path, source: NDArray[Any], rows: NDArray[np.int64], mixed: NDArray[np.bool_]
+    path: Path,
+    source: NDArray[Any],
+    rows: NDArray[np.int64],
+    mixed: NDArray[np.bool_],
+    strange: bool,
 ) -> None:
-    """source[rows] (n,); those of `mixed` (n,) are mixed with another row and stretched."""
+    """source[rows] (n,); those of `mixed` (n,) are mixed with another and stretched,
+    and their bins shuffled if `strange`."""
     rng = np.random.default_rng(0)
     table = np.lib.format.open_memmap(path, mode="w+", dtype=source.dtype, shape=rows.shape)
     for start in range(0, len(rows), CHUNK):
@@ -154,6 +162,8 @@ def write_rows(
                 share * one[field].astype(float) ** 2 + (1 - share) * two[field].astype(float) ** 2
             )
             made[field] = np.rint(np.sqrt(squares))
+            if strange:
+                made[field] = rng.permuted(made[field], axis=-1)
         made["sizes"] = one["sizes"] * rng.uniform(0.5, 1.5, (len(one), 1, 3))
         table[here] = np.where(mixed[here], made, one)
     table.flush()
