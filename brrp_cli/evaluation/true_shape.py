@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 from brrp_cli.evaluation.metrics import evaluation_grid, sample_surface
 from brrp_cli.evaluation.true_meshes import ClosedMeshes
 from brrp_cli.frames.frame import Frame
-from brrp_cli.geometry import project, transform_points
+from brrp_cli.frames.lookup import depth_behind
+from brrp_cli.geometry import transform_points
 from brrp_cli.methods.base import Axes
 from brrp_cli.raycast import inside
 
@@ -93,16 +94,8 @@ def behind_seen(points: Points, frame: Frame) -> Flags:
 
     Points outside of the image and on pixels without depth do not.
     """
-    in_front = points[:, 2] > 0
-    pixels = np.rint(project(points[in_front], frame.K)).astype(np.int64)
-    height, width = frame.shape
-    shown = (pixels >= 0).all(axis=1) & (pixels[:, 0] < width) & (pixels[:, 1] < height)
-    columns, rows = pixels[shown].T
-    which = np.flatnonzero(in_front)[shown]
-    occluded = np.zeros(len(points), dtype=bool)
     # NaN, no return, compares as false.
-    occluded[which] = frame.points[rows, columns, 2] < points[which, 2]
-    return occluded
+    return np.asarray(depth_behind(points, frame) < 0)
 
 
 def _lattice(low: Points, high: Points) -> Points:

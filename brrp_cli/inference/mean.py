@@ -16,9 +16,9 @@ from scipy.ndimage import binary_dilation, map_coordinates
 
 from brrp_cli.config import MeanConfig
 from brrp_cli.frames.frame import BACKGROUND, Frame
+from brrp_cli.frames.lookup import at_pixels, depth_behind
 from brrp_cli.frames.plane import Plane
 from brrp_cli.methods.base import Axes
-from brrp_cli.registration.testimony import at_pixels, depth_behind
 
 Array = NDArray[np.float64]
 # Signed distance (n,), metres, negative inside, of points (n, 3), metres, camera frame.

@@ -2,7 +2,7 @@
 
 `appearance-KEY.npy` is a structured array, one row for each object in the order of their names. It
 holds nothing that the shards do not: where it is missing or damaged, it is made again from them, to
-the same bytes. NumPy maps it into memory, and only rows that are looked at are read.
+the same bytes. looks.py reads the rows that are looked at.
 """
 
 from __future__ import annotations

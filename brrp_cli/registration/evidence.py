@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from brrp_cli.frames.frame import Frame
-from brrp_cli.geometry import project
+from brrp_cli.frames.lookup import depth_behind
 
 
 def explained(
@@ -24,11 +24,5 @@ def contradicted(model: NDArray[np.floating], frame: Frame, tolerance: float) ->
     A point is contradicted when its pixel has a return more than `tolerance` metres behind it.
     Points outside the image or on pixels without a return say nothing.
     """
-    seen = model[model[:, 2] > 0]
-    pixels = np.rint(project(seen, frame.K)).astype(np.int64)
-    height, width = frame.shape
-    inside = (pixels >= 0).all(axis=1) & (pixels[:, 0] < width) & (pixels[:, 1] < height)
-    columns, rows = pixels[inside].T
     # NaN, no return, compares as false.
-    in_front = frame.points[rows, columns, 2] > seen[inside, 2] + tolerance
-    return float(in_front.sum() / max(len(model), 1))
+    return float((depth_behind(model, frame) > tolerance).sum() / max(len(model), 1))

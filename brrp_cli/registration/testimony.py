@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from brrp_cli.config import EvidenceConfig
 from brrp_cli.frames.frame import Frame
+from brrp_cli.frames.lookup import depth_behind
 from brrp_cli.frames.plane import Plane
-from brrp_cli.geometry import project
 from brrp_cli.registration.model import Model
 
 Array = NDArray[np.float64]
@@ -75,26 +75,6 @@ class Testimony:
             return np.zeros(len(T_cam_model))
         depth = -self.plane.signed_distance(_placed(T_cam_model, surface))
         return np.asarray(_ramp(depth, config).mean(axis=1))
-
-
-def depth_behind(points: NDArray[np.floating], frame: Frame) -> Array:
-    """How far behind each of `points` (n, 3), camera frame, its pixel's measured depth lies,
-    metres: positive in free space, negative where the point is hidden. NaN where the point's pixel
-    has no depth, lies outside of the image or behind the camera."""
-    return np.asarray(at_pixels(points, frame.points[..., 2], frame) - points[:, 2])
-
-
-def at_pixels(points: NDArray[np.floating], image: NDArray[np.generic], frame: Frame) -> Array:
-    """Values (n,) of an image (H, W) at the pixels of points (n, 3), camera frame; NaN outside of
-    the image and behind the camera."""
-    found = np.full(len(points), np.nan)
-    ahead = np.flatnonzero(points[:, 2] > 0)
-    pixels = np.rint(project(points[ahead], frame.K)).astype(np.int64)
-    height, width = frame.shape
-    inside = (pixels >= 0).all(axis=1) & (pixels[:, 0] < width) & (pixels[:, 1] < height)
-    columns, rows = pixels[inside].T
-    found[ahead[inside]] = image[rows, columns]
-    return found
 
 
 def _ramp(depth: Array, config: EvidenceConfig) -> Array:

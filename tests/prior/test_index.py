@@ -1,6 +1,5 @@
 import hashlib
 import json
-import os
 from pathlib import Path
 
 import pytest
@@ -83,10 +82,10 @@ def test_another_manifest_than_that_which_was_opened_is_told(prior_folder: Path)
     assert open_prior(prior_folder).manifest.objects
 
 
-@pytest.mark.skipif(os.geteuid() == 0, reason="root writes everywhere")
-def test_a_folder_that_cannot_be_written_is_read(prior_folder: Path) -> None:
+def test_where_no_index_can_be_written_the_prior_is_read(prior_folder: Path) -> None:
     (prior_folder / INDEX_FILE).unlink()
-    prior_folder.chmod(0o555)
+    # Not by taking rights away: root has them all.
+    (prior_folder / INDEX_FILE).mkdir()
     assert open_prior(prior_folder).names == ["ball", "ell", "red_box"]
 
 

@@ -21,10 +21,10 @@ from table_scene import (
 from brrp_cli.config import EvidenceConfig, WeighConfig
 from brrp_cli.demo.layout import turn
 from brrp_cli.frames.frame import Frame
+from brrp_cli.frames.lookup import at_pixels, depth_behind
 from brrp_cli.geometry import backproject, project, similarity
 from brrp_cli.registration import testimony
 from brrp_cli.registration.model import Model, search_model
-from brrp_cli.registration.testimony import at_pixels, depth_behind
 
 BOX = 5
 CONFIG = EvidenceConfig()
