@@ -20,7 +20,7 @@ from brrp_cli.frames.observe import ObjectObservation, observe
 from brrp_cli.frames.plane import Plane
 from brrp_cli.methods.base import FAILED, NO_SURFACE, OK, TOO_FEW_POINTS, ObjectReconstruction
 from brrp_cli.methods.check_prior import check_prior
-from brrp_cli.methods.registry import METHODS
+from brrp_cli.methods.registry import METHODS, RECONSTRUCTING
 from brrp_cli.prior.store import Prior
 from brrp_cli.progress import progress
 
@@ -155,8 +155,8 @@ def reconstruct(
 
 def _check_method(method: str, prior: Prior | None, retriever: Retriever | None) -> None:
     """BrrpError unless there is such a method and it has the prior that it needs, and no other."""
-    if method not in METHODS:
-        raise BrrpError("No such method", found=method, expected=", ".join(METHODS))
+    if method not in RECONSTRUCTING:
+        raise BrrpError("No such method", found=method, expected=", ".join(RECONSTRUCTING))
     if METHODS[method].uses_prior and prior is None:
         raise PriorError(f"{method} needs a prior", fix="pass open_prior(PATH), or method='vprism'")
     if not METHODS[method].uses_prior and not (prior is None and retriever is None):

@@ -12,7 +12,7 @@ from click.core import ParameterSource
 
 from brrp_cli.commands.retriever_option import RetrieverName
 from brrp_cli.config import PRESETS, preset
-from brrp_cli.methods.registry import METHODS
+from brrp_cli.methods.registry import METHODS, RECONSTRUCTING
 from brrp_cli.progress import note
 from brrp_cli.retrieval.choose import RETRIEVERS, choose_retriever
 from brrp_cli.retrieval.clip_files import CLIP_DIR_VARIABLE
@@ -34,7 +34,7 @@ OF_A_PRIOR = ("prior_path", "preset_name", "k", "retriever", "clip_dir")
 @click.option("-o", "--output", type=click.Path(path_type=Path), help="[default: FRAME_METHOD/]")
 @click.option(
     "--method",
-    type=click.Choice(list(METHODS)),
+    type=click.Choice(list(RECONSTRUCTING)),
     default="brrp",
     show_default=True,
     help="vprism: one map of the whole frame, without a prior.",

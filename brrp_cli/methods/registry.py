@@ -29,11 +29,13 @@ class Setup:
 @dataclass(frozen=True)
 class Method:
     """run : all objects of a frame, by id; configuration : what decides its results, plain JSON;
-    uses_prior : whether presets, k and retrievers mean something to it."""
+    uses_prior : whether presets, k and retrievers mean something to it; gives_shapes : whether it
+    reconstructs, or is there to be measured alone."""
 
     run: Callable[[Frame, Setup], list[ObjectReconstruction]]
     configuration: Callable[[Config], dict[str, Any]]
     uses_prior: bool
+    gives_shapes: bool = True
 
 
 def _brrp(frame: Frame, setup: Setup) -> list[ObjectReconstruction]:
@@ -73,6 +75,9 @@ def _vprism_configuration(config: Config) -> dict[str, Any]:
 
 METHODS = {
     "brrp": Method(_brrp, Config.as_dict, uses_prior=True),
-    "retrieval": Method(_retrieval, Config.as_dict, uses_prior=True),
+    "retrieval": Method(_retrieval, Config.as_dict, uses_prior=True, gives_shapes=False),
     "vprism": Method(_vprism, _vprism_configuration, uses_prior=False),
 }
+
+# Those that reconstruct.
+RECONSTRUCTING = tuple(name for name, method in METHODS.items() if method.gives_shapes)

@@ -190,3 +190,12 @@ def test_python_refuses_what_does_not_fit(frame_file):
         reconstruct(frame, method="guess")
     with pytest.raises(BrrpError, match="vprism uses no prior"):
         reconstruct(frame, object(), method="vprism")
+
+
+def test_what_is_measured_alone_does_not_pass_for_a_reconstruction(frame_file, tmp_path):
+    code, output = run(frame_file, "--method", "retrieval", "-o", tmp_path / "out")
+    assert code == 2
+    assert "'brrp', 'vprism'" in output
+    assert not (tmp_path / "out").exists()
+    with pytest.raises(BrrpError, match="No such method"):
+        reconstruct(load_frame(frame_file), object(), method="retrieval")
