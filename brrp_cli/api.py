@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import logging
 import time
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -175,8 +175,9 @@ def _vprism(frame: Frame, config: Config, seed: int) -> Reconstruction:
     scene = sample_scene(frame, own.observation, seed)
     seconds = {"observation": time.perf_counter() - start}
     objects = reconstruct_scene(scene, own, seed)
+    surface = replace(config.surface, level=METHODS["vprism"].level(config))
     for item in progress(objects, "surfaces"):
-        _add_surface(item, config)
+        _add_surface(item, replace(config, surface=surface))
     return Reconstruction(
         frame=frame,
         objects=objects,
@@ -185,7 +186,7 @@ def _vprism(frame: Frame, config: Config, seed: int) -> Reconstruction:
         retriever=None,
         prior_path=None,
         prior_digest=None,
-        configuration={**asdict(own), "surface": asdict(config.surface)},
+        configuration={**asdict(own), "surface": asdict(surface)},
         seed=seed,
         device="cpu",
         seconds=seconds,

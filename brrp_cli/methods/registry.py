@@ -15,6 +15,9 @@ if TYPE_CHECKING:
     from brrp_cli.retrieval.base import Retriever
 
 
+HALF = 0.5
+
+
 @dataclass(frozen=True)
 class Setup:
     """What a method may need besides the frame; prior and retriever only where it uses a prior."""
@@ -30,12 +33,13 @@ class Setup:
 class Method:
     """run : all objects of a frame, by id; configuration : what decides its results, plain JSON;
     uses_prior : whether presets, k and retrievers mean something to it; gives_shapes : whether it
-    reconstructs, or is there to be measured alone."""
+    reconstructs, or is there to be measured alone; level : occupancy at its surface."""
 
     run: Callable[[Frame, Setup], list[ObjectReconstruction]]
     configuration: Callable[[Config], dict[str, Any]]
     uses_prior: bool
     gives_shapes: bool = True
+    level: Callable[[Config], float] = lambda config: HALF
 
 
 def _brrp(frame: Frame, setup: Setup) -> list[ObjectReconstruction]:
@@ -74,7 +78,9 @@ def _vprism_configuration(config: Config) -> dict[str, Any]:
 
 
 METHODS = {
-    "brrp": Method(_brrp, Config.as_dict, uses_prior=True),
+    "brrp": Method(
+        _brrp, Config.as_dict, uses_prior=True, level=lambda config: config.surface.level
+    ),
     "retrieval": Method(_retrieval, Config.as_dict, uses_prior=True, gives_shapes=False),
     "vprism": Method(_vprism, _vprism_configuration, uses_prior=False),
 }
