@@ -14,6 +14,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import Any
 
 import torch
 from torch import Tensor, nn
@@ -64,6 +65,18 @@ class NetworkConfig:
                 "hidden": fewer(self.hidden),
             }
         )
+
+
+def read_config(record: dict[str, Any]) -> NetworkConfig:
+    """What `asdict` made of a NetworkConfig and JSON gave back. Errors: KeyError, TypeError."""
+    return NetworkConfig(
+        **{
+            **record,
+            "features": tuple(map(tuple, record["features"])),
+            "centres": tuple(record["centres"]),
+            "bandwidths": tuple(record["bandwidths"]),
+        }
+    )
 
 
 class PointSDF(nn.Module):
@@ -167,6 +180,7 @@ class Decoder(nn.Module):
 
     def __init__(self, config: NetworkConfig) -> None:
         super().__init__()
+        self.config = config
         hidden, both = config.hidden, CODE + QUERY_CODE
         self.embed = nn.Sequential(
             nn.Linear(3, hidden),

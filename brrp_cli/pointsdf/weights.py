@@ -84,7 +84,7 @@ def describe_weights(path: str | Path) -> dict[str, Any]:
 
 
 def _describe(path: Path) -> tuple[NetworkConfig, dict[str, Any]]:
-    from brrp_cli.pointsdf.network import NetworkConfig
+    from brrp_cli.pointsdf.network import read_config
 
     if not path.is_file():
         raise WeightsError(
@@ -107,11 +107,7 @@ def _describe(path: Path) -> tuple[NetworkConfig, dict[str, Any]]:
             fix=_FIX,
         )
     try:
-        network = json.loads(metadata["network"])
-        network["features"] = tuple(map(tuple, network["features"]))
-        for name in ("centres", "bandwidths"):
-            network[name] = tuple(network[name])
-        return NetworkConfig(**network), json.loads(metadata["training"])
+        return read_config(json.loads(metadata["network"])), json.loads(metadata["training"])
     except (KeyError, TypeError, ValueError) as error:
         raise _unreadable(path, error) from error
 
