@@ -39,7 +39,7 @@ EMPTY = 0.02
 class PointSDFPosterior:
     """One object's occupancy; an OccupancyPosterior.
 
-    decoder : shared by all objects of a frame; code : (CODE,) float32, what the encoder made of the
+    decoder : shared by all objects of a frame; code : (C,) float32, what the encoder made of the
     object's cloud; center : (3,) metres, camera frame, of the cloud's bounding box; scale : metres
     of the decoder's unit
     """

@@ -3,7 +3,7 @@
     /decoder            network: JSON of its NetworkConfig
     /decoder/NAME       the decoder's tensors, float32
     /objects/ID         center (3), scale, half_width
-    /objects/ID/code    (CODE,) float32
+    /objects/ID/code    (C,) float32
 
 So the file answers without the weights that it came from.
 """
@@ -64,11 +64,9 @@ def write_object(group: h5py.Group, posterior: PointSDFPosterior) -> None:
 
 def read_object(group: h5py.Group, decoder: Decoder) -> PointSDFPosterior:
     """The object's posterior. Errors: KeyError, ValueError."""
-    from brrp_cli.pointsdf.network import CODE
-
     code = np.asarray(group["code"], dtype=np.float32)
-    if code.shape != (CODE,):
-        raise ValueError(f"a code of shape {code.shape}, not ({CODE},)")
+    if code.shape != (decoder.config.code,):
+        raise ValueError(f"a code of shape {code.shape}, not ({decoder.config.code},)")
     return PointSDFPosterior(
         decoder,
         code,

@@ -19,9 +19,6 @@ from typing import Any
 import torch
 from torch import Tensor, nn
 
-CODE = 256
-QUERY_CODE = 256
-
 
 @dataclass(frozen=True)
 class NetworkConfig:
@@ -34,6 +31,7 @@ class NetworkConfig:
     centres, bandwidths, features : of each encoder layer: points that are kept, the standard
         deviation of the density's kernel, and the widths of its point-wise layers
     neighbours : of a centre, the nearest of the layer before
+    code, query_code : what a cloud and a query point are embedded in
     hidden : width of the MLP's layers
     dropout : of the query's embedding, in training
     """
@@ -49,6 +47,8 @@ class NetworkConfig:
         (128, 128, 256),
         (256, 256, 512),
     )
+    code: int = 256
+    query_code: int = 256
     hidden: int = 512
     dropout: float = 0.2
 
@@ -94,12 +94,12 @@ class PointSDF(nn.Module):
         return self.decode(self.encode(clouds), queries)
 
     def encode(self, clouds: Tensor) -> Tensor:
-        """Codes (B, CODE) of clouds (B, P, 3)."""
+        """Codes (B, C) of clouds (B, P, 3)."""
         codes: Tensor = self.encoder(clouds)
         return codes
 
     def decode(self, codes: Tensor, queries: Tensor) -> Tensor:
-        """Logits (B, Q) at queries (B, Q, 3) for codes (B, CODE)."""
+        """Logits (B, Q) at queries (B, Q, 3) for codes (B, C)."""
         logits: Tensor = self.decoder(codes, queries)
         return logits
 
@@ -118,10 +118,10 @@ class Encoder(nn.Module):
             layers.append(PointConv(kept, config.neighbours, bandwidth, width, features))
             width = features[-1]
         self.layers = nn.ModuleList(layers)
-        self.code = linear(min(config.centres[-1], config.points) * width, CODE)
+        self.code = linear(min(config.centres[-1], config.points) * width, config.code)
 
     def forward(self, clouds: Tensor) -> Tensor:
-        """Codes (B, CODE)."""
+        """Codes (B, C)."""
         places, features = clouds, clouds
         for layer in self.layers:
             places, features = layer(places, features)
@@ -181,12 +181,12 @@ class Decoder(nn.Module):
     def __init__(self, config: NetworkConfig) -> None:
         super().__init__()
         self.config = config
-        hidden, both = config.hidden, CODE + QUERY_CODE
+        hidden, both = config.hidden, config.code + config.query_code
         self.embed = nn.Sequential(
             nn.Linear(3, hidden),
             nn.ReLU(),
             nn.Dropout(config.dropout),
-            nn.Linear(hidden, QUERY_CODE),
+            nn.Linear(hidden, config.query_code),
             nn.ReLU(),
             nn.Dropout(config.dropout),
         )
@@ -195,7 +195,7 @@ class Decoder(nn.Module):
         self.out = nn.Linear(hidden, 1)
 
     def forward(self, codes: Tensor, queries: Tensor) -> Tensor:
-        """Logits (B, Q) at queries (B, Q, 3) for codes (B, CODE)."""
+        """Logits (B, Q) at queries (B, Q, 3) for codes (B, C)."""
         batch, count = queries.shape[:2]
         repeated = codes[:, None].expand(batch, count, codes.shape[1])
         joined = torch.cat([repeated, self.embed(queries)], dim=-1).flatten(0, 1)

@@ -160,14 +160,13 @@ class Training:
             raise BrrpError(
                 "The checkpoint cannot be read", where=path, found=error, fix="delete it"
             ) from error
-        wanted = self._fixed()
+        wanted, kept = self._fixed(), found["fixed"]
+        names = [k for k in wanted if kept.get(k) != wanted[k]]
         raise BrrpError(
             "The folder holds another training",
             where=path,
-            expected=", ".join(f"{k} = {v}" for k, v in wanted.items() if found["fixed"][k] != v),
-            found=", ".join(
-                f"{k} = {found['fixed'][k]}" for k, v in wanted.items() if found["fixed"][k] != v
-            ),
+            expected=", ".join(f"{k} = {wanted[k]}" for k in names),
+            found=", ".join(f"{k} = {kept.get(k)}" for k in names),
             fix="choose another folder with -o, or the options that it was begun with",
         )
 
