@@ -1,4 +1,4 @@
-"""A scene of eight solids on a table, in files, and a network small enough to learn it in a test."""
+"""Scenes of eight solids on a table, in files, and a network small enough to learn them."""
 
 from __future__ import annotations
 
@@ -11,7 +11,6 @@ from table_scene import in_camera, photograph, placed
 
 from brrp_cli.evaluation.scenes import Scene, find_scenes
 from brrp_cli.frames.npz import save_frame
-from brrp_cli.geometry import similarity
 from brrp_cli.pointsdf.network import NetworkConfig
 from brrp_cli.shapes import kinds, solids
 
@@ -65,8 +64,3 @@ def write_scenes(folder: Path, count: int = 1) -> list[Scene]:
         save_frame(photograph(things), folder / "scenes" / f"{number}.npz")
         (folder / "scenes" / f"{number}.truth.json").write_text(json.dumps(truth))
     return find_scenes(folder / "scenes")
-
-
-def moved_to(x: float, y: float, z: float) -> np.ndarray:
-    """(4, 4) of a shift."""
-    return similarity(translation=np.array([x, y, z]))

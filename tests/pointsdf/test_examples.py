@@ -1,7 +1,7 @@
 import h5py
 import numpy as np
 import pytest
-from eight_objects import MESHES, write_scenes
+from eight_objects import MESHES
 
 from brrp_cli.errors import BrrpError
 from brrp_cli.geometry import transform_points
@@ -12,20 +12,13 @@ RECIPE = Recipe(truth="exact", points=64, queries=256)
 
 
 @pytest.fixture(scope="module")
-def place(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("examples")
-    return folder, write_scenes(folder, 2)
-
-
-@pytest.fixture(scope="module")
 def found(place):
-    folder, scenes = place
-    return scene_examples(scenes[0], folder, RECIPE, folder / "cache")
+    return scene_examples(place.scenes[0], place.folder, RECIPE, place.folder / "cache")
 
 
 def make(place, output, recipe=RECIPE):
-    folder, scenes = place
-    return list(make_examples(scenes, folder, recipe, output, folder / "cache"))
+    cache = place.folder / "cache"
+    return list(make_examples(place.scenes, place.folder, recipe, output, cache))
 
 
 def test_every_object_that_is_seen_is_an_example(found):
@@ -34,12 +27,12 @@ def test_every_object_that_is_seen_is_an_example(found):
 
 
 def test_clouds_and_labels_lie_where_the_object_is(place, found):
-    folder, scenes = place
-    frame = scenes[0].view(0)
+    scene = place.scenes[0]
+    frame = scene.view(0)
     for i, name in enumerate(found.names):
         points = frame.object_points(i + 1)
         center = (points.min(axis=0) + points.max(axis=0)) / 2
-        T_object_world = np.linalg.inv(scenes[0].object(i + 1).T_world_object)
+        T_object_world = np.linalg.inv(scene.object(i + 1).T_world_object)
         T_object_cam = T_object_world @ frame.T_world_cam
         mesh = MESHES[name]
 

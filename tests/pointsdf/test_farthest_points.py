@@ -22,9 +22,7 @@ def test_each_point_is_the_furthest_from_those_before_it(count, seed):
 
 
 def test_a_leading_part_is_the_order_of_its_length():
-    np.testing.assert_array_equal(
-        farthest_points(cloud(), 256)[:36], farthest_points(cloud(), 36)
-    )
+    np.testing.assert_array_equal(farthest_points(cloud(), 256)[:36], farthest_points(cloud(), 36))
 
 
 def test_the_order_of_the_pixels_does_not_matter():
