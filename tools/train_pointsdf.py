@@ -22,9 +22,13 @@ history.json has losses and IoU of each epoch.
 
 from __future__ import annotations
 
+import signal
 import sys
 from collections import Counter
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
+from threading import Event
 from time import monotonic
 
 import click
@@ -92,7 +96,6 @@ def main(
     from brrp_cli.pointsdf.training import Training, TrainingConfig, split
 
     began = monotonic()
-    training = None
     try:
         network = NetworkConfig().narrowed(width)
         recipe = Recipe(truth, network.points, scale=network.scale)
@@ -111,6 +114,13 @@ def main(
             return
         names = split([path.name for path in paths], validation, seed)
         train, held = (read_examples([folder / n for n in group], recipe) for group in names)
+        if len(train) < 2 or not len(held):
+            raise BrrpError(
+                "There is too little to train on or to validate with",
+                where=folder,
+                found=f"{len(train)} and {len(held)} objects",
+                fix="make more scenes",
+            )
         about = {
             "name": output.name,
             "scenes": len(paths),
@@ -141,23 +151,39 @@ def main(
                     f"{record['seconds']:.0f} s"
                 )
 
-            finished = training.run(
-                train,
-                held,
-                every=every,
-                go_on=lambda: minutes is None or monotonic() - began < 60 * minutes,
-                stepped=stepped,
-                ended=ended,
-            )
+            with signalled() as stop:
+
+                def go_on() -> bool:
+                    late = minutes is not None and monotonic() - began >= 60 * minutes
+                    return not (late or stop.is_set())
+
+                finished = training.run(
+                    train, held, every=every, go_on=go_on, stepped=stepped, ended=ended
+                )
     except BrrpError as error:
         raise click.ClickException(str(error)) from error
-    except KeyboardInterrupt:
-        if training is not None:
-            training.save()
-        raise
     if not finished:
         click.echo(f"Stopped in epoch {done.epoch + 1}; the same command goes on")
     click.echo(f"Wrote {output}/ ({weights.name}, history.json, checkpoint.pt)")
+
+
+@contextmanager
+def signalled() -> Iterator[Event]:
+    """An event that Ctrl-C or SIGTERM sets, so that the step at work is ended and kept; a second
+    Ctrl-C does not wait for it."""
+    stop = Event()
+
+    def note(number: int, frame: object) -> None:
+        if stop.is_set():
+            raise KeyboardInterrupt
+        stop.set()
+
+    before = {number: signal.signal(number, note) for number in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        yield stop
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
 
 
 if __name__ == "__main__":

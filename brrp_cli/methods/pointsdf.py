@@ -92,9 +92,10 @@ class PointSDFPosterior:
         beyond = (index > COARSE * (np.array(coarse.shape) - 1)).any(axis=-1)
         likely = maximum_filter(coarse, size=3, mode="nearest") > EMPTY
         asked = likely[tuple(np.moveaxis(cell, -1, 0))] | beyond
-        place = np.moveaxis(index[~asked], -1, 0) / COARSE
         result = np.empty(shape, dtype=np.float32)
-        result[~asked] = map_coordinates(coarse, place, order=1, mode="nearest")
+        if not asked.all():
+            place = np.moveaxis(index[~asked], -1, 0) / COARSE
+            result[~asked] = map_coordinates(coarse, place, order=1, mode="nearest")
         points = np.stack([axis[i] for axis, i in zip(axes, index[asked].T, strict=True)], axis=-1)
         result[asked] = self.probability(points)
         return result

@@ -2,7 +2,7 @@
 
 All that is random in a step comes from the seed, the epoch and the step's number alone. A
 checkpoint holds everything else that a step depends on, so that a training that was interrupted
-goes on as if it had not been.
+goes on as if it had not been (on the CPU to the last bit; CUDA adds in no fixed order).
 """
 
 from __future__ import annotations
@@ -185,9 +185,10 @@ class Training:
         )
 
     def batches(self, count: int, epoch: int) -> list[NDArray[np.int64]]:
-        """All examples once, in an order of the epoch's own; batches differ by one at most."""
+        """All examples once, in an order of the epoch's own, as evenly as may be: no batch is
+        smaller than it should be, since batch normalisation needs two examples."""
         order = child_rng(self.config.seed, "order", epoch).permutation(count)
-        return np.array_split(order, max(1, round(count / self.config.batch)))
+        return np.array_split(order, max(1, count // self.config.batch))
 
     def _step(self, train: Examples, rows: NDArray[np.int64], step: int) -> float:
         names = (self.progress.epoch, step)
