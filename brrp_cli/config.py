@@ -264,6 +264,19 @@ def _vprism_observation() -> ObservationConfig:
 
 
 @dataclass(frozen=True)
+class PointSDFConfig:
+    """The PointSDF baseline: what is asked of a trained network.
+
+    level : occupancy at the surface, the paper's; half_width : of the box around the middle of what
+    was seen outside of which occupancy is 0
+    """
+
+    level: float = 0.3
+    min_points: int = 16
+    half_width: float = 0.2
+
+
+@dataclass(frozen=True)
 class VPrismConfig:
     """The V-PRISM baseline (Wright et al. 2024, arXiv 2403.08106), as its authors ran it.
 

@@ -1,10 +1,10 @@
 """Fit the network that completes objects which no stored one explains (brrp_cli/completion).
 
-    python tools/fit_completion.py SCENES:DATA_ROOT HOUSEHOLD_SCENES:DATA_ROOT
+    python tools/fit_completion.py SCENES:DATA_ROOT HOUSEHOLD_SCENES:DATA_ROOT ...
 
-What the package holds was fitted on 200 scenes of 50 YCB objects (seed 5000), 100 of 150 household
-shapes (`tools/export_household_shapes.py`, seed 6000) and 100 of 200 solids without a kind
-(`tools/export_composed_shapes.py`, seed 6001), two views of each.
+What the package holds was fitted on two views each of 200 scenes of 50 YCB objects (seed 5000), 100
+of 150 household shapes (seed 6000) and 100 of 200 composed solids (seed 6001); the shapes are those
+of `tools/export_drawn_shapes.py` with seeds 5000 and 0.
 
 Scenes of `tools/make_scenes.py` without noise; every second view is given the noise of a
 structured-light camera, every fourth one masks that are shifted by two pixels. A third part, as in

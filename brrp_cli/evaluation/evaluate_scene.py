@@ -83,7 +83,8 @@ def _reconstruct(
     memory: dict[str, RememberingRetriever],
 ) -> tuple[dict[int, ObjectReconstruction] | BrrpError, float]:
     """What the method found, by id, and the peak of memory in MB."""
-    setup = Setup(variant.config, plan.seed, plan.device)
+    weights = None if variant.weights is None else plan.weights[variant.weights]
+    setup = Setup(variant.config, plan.seed, plan.device, weights=weights)
     reset_peak()
     try:
         if METHODS[variant.method].uses_prior:
