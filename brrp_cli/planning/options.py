@@ -1,0 +1,21 @@
+"""What a user decides about collision shapes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from brrp_cli.planning.parts import COACD
+
+# kg / m^3. A guess between an empty box (200) and a full bottle (1,000).
+DENSITY = 500.0
+
+
+@dataclass(frozen=True)
+class PlanOptions:
+    """collision : "coacd" or "hull"; confidence : that the object lies inside of its collision
+    shape, None: the shape is of the mesh; density : kg / m^3, of the solid mesh."""
+
+    collision: str = COACD
+    confidence: float | None = None
+    density: float = DENSITY
+    seed: int = 0
