@@ -13,9 +13,13 @@ from __future__ import annotations
 
 import argparse
 import json
+import sys
 from pathlib import Path
 
 import numpy as np
+
+# The script also runs from a checkout that is not installed.
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from brrp_cli.api import reconstruct
 from brrp_cli.config import preset
@@ -70,7 +74,7 @@ def measure(arguments: argparse.Namespace) -> None:
             if pixels < MIN_PIXELS:
                 continue
             true = scene.object(item.object_id)
-            mesh = true_mesh_in_camera(true, arguments.data_root, frame)
+            mesh = true_mesh_in_camera(true, arguments.data_root, frame.T_world_cam)
             rng = child_rng(0, "coverage", scene.name, item.object_id)
             rows.append(
                 {
