@@ -14,24 +14,25 @@ from __future__ import annotations
 import argparse
 import json
 import sys
+from functools import partial
 from pathlib import Path
 
 import numpy as np
+import trimesh
 
 # The script also runs from a checkout that is not installed.
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from brrp_cli.api import reconstruct
-from brrp_cli.config import preset
+from brrp_cli.api import Reconstruction, reconstruct
+from brrp_cli.config import MeanConfig, preset
 from brrp_cli.dependencies import import_open3d
 from brrp_cli.evaluation.metrics import sample_surface
 from brrp_cli.evaluation.scenes import find_scenes, true_mesh_in_camera
-from brrp_cli.inference.particles import particle_volumes
+from brrp_cli.inference.mean import empty_space
 from brrp_cli.methods.base import ObjectReconstruction
 from brrp_cli.prior.store import Prior, open_prior
 from brrp_cli.seeds import child_rng
-from brrp_cli.surface.confidence import confidence_level
-from brrp_cli.surface.extract import lattice_axes, level_set
+from brrp_cli.surface.confidence import Empty, confidence_surface
 
 CONFIDENCES = (0.5, 0.8, 0.9, 0.95, 0.99)
 POINTS = 4_000
@@ -46,6 +47,7 @@ def main() -> None:
     parser.add_argument("--data-root", type=Path)
     parser.add_argument("--method", default="brrp")
     parser.add_argument("--preset", default="default")
+    parser.add_argument("--margin", type=float, default=0.0, help="mm, into unseen space")
     parser.add_argument("--first", type=int, default=10, help="scenes")
     parser.add_argument("-o", "--output", type=Path)
     parser.add_argument("--report", type=Path)
@@ -76,6 +78,8 @@ def measure(arguments: argparse.Namespace) -> None:
             true = scene.object(item.object_id)
             mesh = true_mesh_in_camera(true, arguments.data_root, frame.T_world_cam)
             rng = child_rng(0, "coverage", scene.name, item.object_id)
+            surface = np.asarray(sample_surface(mesh, POINTS, rng))
+            empty = partial(_empty, result, item.object_id)
             rows.append(
                 {
                     "scene": scene.name,
@@ -85,7 +89,7 @@ def measure(arguments: argparse.Namespace) -> None:
                     "stored": _stored(prior, true.name),
                     "status": item.status,
                     "unknown_weight": item.unknown_weight,
-                    "found": _coverage(item, np.asarray(sample_surface(mesh, POINTS, rng))),
+                    "found": _coverage(item, surface, arguments.margin / 1000, empty),
                 }
             )
         with arguments.output.open("a") as stream:
@@ -97,33 +101,39 @@ def _stored(prior: Prior | None, name: str) -> bool:
     return prior is not None and name in prior.names
 
 
-def _coverage(item: ObjectReconstruction, points: np.ndarray) -> list[dict[str, float]]:
+def _coverage(
+    item: ObjectReconstruction, points: np.ndarray, margin: float, empty: Empty
+) -> list[dict[str, float]]:
     """A row for each confidence; empty without a posterior."""
     if item.posterior is None or item.observed is None:
         return []
     config = preset("default").surface
-    axes = lattice_axes(item.posterior.bounds, config.spacing)
-    volumes = particle_volumes(item.posterior, axes)
-    mean = volumes.mean(axis=0)
     p = item.posterior.probability(points)
     rows = []
     for confidence in CONFIDENCES:
-        level = confidence_level(volumes, confidence)
-        region = None if level is None else level_set(mean, axes, item.observed, level, config)
-        if level is None or region is None:
+        region = confidence_surface(
+            item.posterior, item.observed, confidence, config, margin, empty
+        )
+        if region is None:
             continue
         outside = _outside(region.vertices, region.faces, points)
+        mesh = trimesh.Trimesh(region.vertices, region.faces, process=False)
         rows.append(
             {
                 "confidence": confidence,
-                "level": level,
+                "level": region.level,
                 "share": float((outside <= 0).mean()),
                 "worst": float(outside.max()),
                 "share_each_point": float((p >= 1 - confidence).mean()),
-                "litre": float((mean >= level).sum() * config.spacing**3 * 1000),
+                "litre": float(mesh.volume) * 1000,
             }
         )
     return rows
+
+
+def _empty(result: Reconstruction, object_id: int, points: np.ndarray) -> np.ndarray:
+    """Which points (n, 3), camera frame, were seen to be empty."""
+    return empty_space(points, result.frame, object_id, result.plane, MeanConfig())
 
 
 def _outside(vertices: np.ndarray, faces: np.ndarray, points: np.ndarray) -> np.ndarray:

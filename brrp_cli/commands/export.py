@@ -37,6 +37,13 @@ CONFIDENCE = click.FloatRange(0.5, 0.999)
     "[default: shapes of the meshes]",
 )
 @click.option(
+    "--margin",
+    type=click.FloatRange(min=0, max=200),
+    default=0.0,
+    show_default=True,
+    help="Millimetres by which --confidence's shapes grow into space that was not seen to be empty.",
+)
+@click.option(
     "--density",
     type=click.FloatRange(min=0, min_open=True),
     default=DENSITY,
@@ -50,6 +57,7 @@ def command(
     output: Path | None,
     collision: str,
     confidence: float | None,
+    margin: float,
     density: float,
     seed: int,
     overwrite: bool,
@@ -67,7 +75,9 @@ def command(
     """
     from brrp_cli.surface.stored import open_result
 
-    options = PlanOptions(collision, confidence, density, seed)
+    if margin and confidence is None:
+        raise click.UsageError("--margin grows the shapes of --confidence, so give both")
+    options = PlanOptions(collision, confidence, margin / 1000, density, seed)
     export(open_result(results), output, options, overwrite=overwrite)
 
 

@@ -13,9 +13,11 @@ DENSITY = 500.0
 @dataclass(frozen=True)
 class PlanOptions:
     """collision : "coacd" or "hull"; confidence : that the object lies inside of its collision
-    shape, None: the shape is of the mesh; density : kg / m^3, of the solid mesh."""
+    shape, None: the shape is of the mesh; margin : metres by which the shape is grown beyond that
+    into space that was not seen to be empty; density : kg / m^3, of the solid mesh."""
 
     collision: str = COACD
     confidence: float | None = None
+    margin: float = 0.0
     density: float = DENSITY
     seed: int = 0

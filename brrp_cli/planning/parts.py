@@ -31,6 +31,12 @@ def convex_parts(vertices: Array, faces: NDArray[np.int64], how: str, seed: int)
     return cover([hull_corners(part) for part in _decomposed(vertices, faces, seed)], vertices)
 
 
+def check_available(how: str) -> None:
+    """DependencyError now, not after the work, where `how` lacks its library."""
+    if how == COACD:
+        import_library("coacd")
+
+
 def hull_corners(points: Array) -> Array:
     """The points (k, 3) of (n, 3) that are corners of their convex hull."""
     from scipy.spatial import ConvexHull

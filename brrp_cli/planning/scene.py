@@ -9,9 +9,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from brrp_cli.config import MeanConfig
 from brrp_cli.errors import ResultError
 from brrp_cli.frames.plane import Plane
 from brrp_cli.geometry import similarity, transform_points
+from brrp_cli.inference.mean import empty_space
 from brrp_cli.planning.body import Body, body_axes, body_pose, mass_and_inertia
 from brrp_cli.planning.mjcf import Table
 from brrp_cli.planning.options import PlanOptions
@@ -53,7 +55,7 @@ def planned_objects(stored: StoredResult, options: PlanOptions) -> Iterator[Plan
             )
         region = None
         if options.confidence is not None:
-            region = _region(stored, object_id, options.confidence)
+            region = _region(stored, object_id, options.confidence, options.margin)
         T_frame_body = body_pose(mesh, axes)
         T_body_frame = np.linalg.inv(T_frame_body)
         local = mesh.copy().apply_transform(T_body_frame)
@@ -94,12 +96,19 @@ def table_under(bodies: list[Body], plane: Plane | None) -> Table | None:
     return Table(similarity(1.0, axes, axes @ middle), size)
 
 
-def _region(stored: StoredResult, object_id: int, confidence: float) -> ConfidenceSurface:
+def _region(
+    stored: StoredResult, object_id: int, confidence: float, margin: float
+) -> ConfidenceSurface:
+    def empty(points: NDArray[np.float64]) -> NDArray[np.bool_]:
+        return empty_space(points, stored.frame, object_id, stored.plane_cam, MeanConfig())
+
     found = confidence_surface(
         stored.posteriors[object_id],
         stored.frame.object_points(object_id),
         confidence,
         stored.surface_config,
+        margin,
+        empty,
     )
     if found is None:
         raise ResultError(

@@ -125,6 +125,7 @@ def _record(
         "units": {"length": "metre", "mass": "kilogram", "inertia": "kg m^2"},
         "collision": options.collision,
         "confidence": options.confidence,
+        "margin": options.margin,
         "density": options.density,
         "seed": options.seed,
         "up": upwards(stored).tolist(),

@@ -70,14 +70,19 @@ class StoredResult:
         return open_posterior(self.folder / POSTERIOR)
 
     @property
+    def plane_cam(self) -> Plane | None:
+        """The support plane in the camera frame."""
+        stored = self.record["plane_cam"]
+        return None if stored is None else Plane(np.asarray(stored["normal"]), stored["offset"])
+
+    @property
     def plane(self) -> Plane | None:
         """The support plane in the frame of the meshes."""
-        stored = self.record["plane_cam"]
-        if stored is None:
+        plane = self.plane_cam
+        if plane is None:
             return None
-        normal = np.asarray(stored["normal"])
-        on_plane = transform_points(self.T_frame_cam, -stored["offset"] * normal)
-        normal = self.T_frame_cam[:3, :3] @ normal
+        on_plane = transform_points(self.T_frame_cam, -plane.offset * plane.normal)
+        normal = self.T_frame_cam[:3, :3] @ plane.normal
         return Plane(normal, float(-normal @ on_plane))
 
     @property
