@@ -39,9 +39,10 @@ def import_library(name: str) -> ModuleType:
         return importlib.import_module(name)
     except (ImportError, OSError) as error:
         found = str(error)
+        package = _PACKAGES.get(name, name.split(".")[0])
         fix = next(
             (text for library, text in _FIXES.items() if library in found),
-            f"pip install {_PACKAGES.get(name, name.split('.')[0])}, in the environment that runs brrp",
+            f"pip install {package}, in the environment that runs brrp",
         )
         raise DependencyError(f"{name} does not load", found=found, fix=fix) from error
 

@@ -168,9 +168,7 @@ def report(rows: list[dict]) -> None:
         print(f"{name}: {len(group)} objects, {len(group) - len(with_posterior)} without a surface")
         print("  confidence   whole   but 1 %   within 5 mm   points   points, each alone   litre")
         for confidence in CONFIDENCES:
-            found = [
-                f for r in with_posterior for f in r["found"] if f["confidence"] == confidence
-            ]
+            found = [f for r in with_posterior for f in r["found"] if f["confidence"] == confidence]
             share = np.array([f["share"] for f in found])
             worst = np.array([f["worst"] for f in found])
             print(

@@ -41,7 +41,7 @@ CONFIDENCE = click.FloatRange(0.5, 0.999)
     type=click.FloatRange(min=0, max=200),
     default=0.0,
     show_default=True,
-    help="Millimetres by which --confidence's shapes grow into space that was not seen to be empty.",
+    help="Millimetres by which the shapes of --confidence grow into space not seen to be empty.",
 )
 @click.option(
     "--density",

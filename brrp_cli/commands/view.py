@@ -13,11 +13,17 @@ from brrp_cli.progress import note
 @click.command("view")
 @click.argument("results", metavar="OUT/", type=click.Path(path_type=Path))
 @click.option(
-    "-o", "--output", metavar="PAGE.html", type=click.Path(path_type=Path), help="[default: OUT/view.html]"
+    "-o",
+    "--output",
+    metavar="PAGE.html",
+    type=click.Path(path_type=Path),
+    help="[default: OUT/view.html]",
 )
 @click.option("--open/--no-open", "open_it", default=True, help="Open the page in a browser.")
 @click.option(
-    "--rerun", is_flag=True, help="Show in Rerun instead (pip install rerun-sdk); -o FILE.rrd writes."
+    "--rerun",
+    is_flag=True,
+    help="Show in Rerun instead (pip install rerun-sdk); -o FILE.rrd writes.",
 )
 def command(results: Path, output: Path | None, open_it: bool, rerun: bool) -> None:
     """Write and open one HTML page that shows the results in OUT/.

@@ -92,9 +92,7 @@ def _add_body(
     ET.SubElement(element, "freejoint", name=f"{body.name}_free")
     (xx, xy, xz), (_, yy, yz), (_, _, zz) = body.inertia
     inertia = spell([xx, yy, zz, xy, xz, yz])
-    ET.SubElement(
-        element, "inertial", pos="0 0 0", mass=spell([body.mass]), fullinertia=inertia
-    )
+    ET.SubElement(element, "inertial", pos="0 0 0", mass=spell([body.mass]), fullinertia=inertia)
     ET.SubElement(assets, "mesh", name=body.name, file=files.mesh)
     ET.SubElement(
         element,

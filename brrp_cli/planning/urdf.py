@@ -19,9 +19,7 @@ def urdf(body: Body, mesh_file: str, part_files: Sequence[str]) -> str:
     (xx, xy, xz), (_, yy, yz), (_, _, zz) = body.inertia
     names = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
     values = (xx, xy, xz, yy, yz, zz)
-    ET.SubElement(
-        inertial, "inertia", {n: spell([v]) for n, v in zip(names, values, strict=True)}
-    )
+    ET.SubElement(inertial, "inertia", {n: spell([v]) for n, v in zip(names, values, strict=True)})
     visual = _with_mesh(link, "visual", mesh_file)
     material = ET.SubElement(visual, "material", name=f"{body.name}_colour")
     ET.SubElement(material, "color", rgba=spell([*body.colour, 1.0]))

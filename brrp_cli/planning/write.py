@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from brrp_cli.errors import ResultError
 from brrp_cli.files import atomic_folder
@@ -167,7 +168,7 @@ def _object_record(each: PlannedObject, files: Files) -> dict[str, Any]:
     return record
 
 
-def margins(body: Body) -> np.ndarray:
+def margins(body: Body) -> NDArray[np.float32]:
     """How far (n,), metres, the vertices of the collision shape lie from the mesh."""
     from brrp_cli.dependencies import import_open3d
 

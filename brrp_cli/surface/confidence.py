@@ -33,7 +33,6 @@ from brrp_cli.inference.particles import particle_volumes
 from brrp_cli.methods.base import Axes, OccupancyPosterior
 from brrp_cli.surface.extract import lattice_axes, level_set
 
-
 # Which of points (n, 3), metres, camera frame, were seen to be empty: (n,) bool.
 Empty = Callable[[NDArray[np.float64]], NDArray[np.bool_]]
 

@@ -21,7 +21,7 @@ def told(stored: StoredResult) -> dict[str, Any]:
     """The record of the results, a colour for each object, the colour scale and the camera."""
     record = stored.record
     colours = object_colours(stored.object_ids)
-    keys = ("method", "retriever", "frame", "seed", "brrp", "source", "prior", "seconds")
+    keys = ("method", "retriever", "frame", "seed", "brrp")
     return {
         **{key: record[key] for key in keys},
         "preset": record["config"].get("preset"),

@@ -27,8 +27,8 @@ def test_the_inertia_of_a_box_is_the_books():
     width, depth, height, density = 0.1, 0.2, 0.3, 700.0
     mass, inertia = mass_and_inertia(solids.box(width, depth, height), density)
     assert mass == pytest.approx(density * width * depth * height)
-    expected = mass / 12 * np.array(
-        [depth**2 + height**2, width**2 + height**2, width**2 + depth**2]
+    expected = (
+        mass / 12 * np.array([depth**2 + height**2, width**2 + height**2, width**2 + depth**2])
     )
     np.testing.assert_allclose(inertia, np.diag(expected), rtol=1e-9, atol=1e-12)
 

@@ -123,7 +123,9 @@ def test_a_margin_holds_the_true_surface_and_follows_the_uncertainty(results, gr
         assert item["bounded"]
         assert item["margin_mean"] == pytest.approx(0.0059, abs=0.001)
         mesh = trimesh.load_mesh(results / f"object_{object_id}.ply", process=False)
-        region = trimesh.load_mesh(grown / "meshes" / f"object_{object_id}_inside.obj", process=False)
+        region = trimesh.load_mesh(
+            grown / "meshes" / f"object_{object_id}_inside.obj", process=False
+        )
         assert region.is_watertight and region.volume > mesh.volume
     assert record(grown)["confidence"] == 0.95
 

@@ -134,9 +134,7 @@ def test_particles_average_to_the_posterior():
     axes = lattice_axes(posterior.bounds, 0.005)
     volumes = particle_volumes(posterior, axes)
     assert len(volumes) == 3
-    np.testing.assert_allclose(
-        volumes.mean(axis=0), posterior.probability_volume(axes), atol=1e-6
-    )
+    np.testing.assert_allclose(volumes.mean(axis=0), posterior.probability_volume(axes), atol=1e-6)
 
 
 def test_a_margin_grows_it_but_not_into_space_that_was_seen_to_be_empty():

@@ -16,7 +16,9 @@ from made_result import BOX, ELL, SPECK, write_made_result
 
 from brrp_cli.cli import main
 
-needs_browser = pytest.mark.skipif(chromium() is None, reason="no Chromium: BRRP_CHROMIUM names one")
+needs_browser = pytest.mark.skipif(
+    chromium() is None, reason="no Chromium: BRRP_CHROMIUM names one"
+)
 
 
 def run(*arguments: object) -> tuple[int, str]:
@@ -146,7 +148,15 @@ def test_the_list_and_the_scale_tell_the_numbers_of_the_record(page, results):
         tab.open(page)
         cards = {i: tab.run(f"document.querySelector('.card[data-object=\"{i}\"]').innerText")
                  for i in (BOX, ELL, SPECK)}  # fmt: skip
-        for told in ("a <b>box</b> & more", "0.75", "0.90", "0.97", "none of them", "0.20", "0.8 s"):
+        for told in (
+            "a <b>box</b> & more",
+            "0.75",
+            "0.90",
+            "0.97",
+            "none of them",
+            "0.20",
+            "0.8 s",
+        ):
             assert told in cards[BOX]
         assert "too few points" in cards[SPECK] and "4 valid depth points" in cards[SPECK]
         box = next(item for item in record["objects"] if item["id"] == BOX)
@@ -162,7 +172,9 @@ def test_the_list_and_the_scale_tell_the_numbers_of_the_record(page, results):
         for shift in range(-240, 241, 40):
             tab.click_at(x + shift, y)
         read = tab.run("document.querySelector('#probe').innerText")
-        assert read != said and re.match(r"object -?\d+: spread .* mm; \(.*\) m, camera frame", read)
+        assert read != said and re.match(
+            r"object -?\d+: spread .* mm; \(.*\) m, camera frame", read
+        )
 
 
 def test_rerun_writes_a_recording_of_everything(results, tmp_path):
