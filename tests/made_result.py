@@ -37,7 +37,7 @@ def hollow_ell() -> trimesh.Trimesh:
     )
 
 
-HOLLOW = (0.08 + 0.03, 0.03, 0.07)  # above the longer leg, world
+HOLLOW = (0.08, 0.03, 0.05)  # above the longer leg, world
 
 
 def truth() -> dict[int, trimesh.Trimesh]:

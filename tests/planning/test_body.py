@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 import trimesh
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from brrp_cli.geometry import similarity
@@ -14,6 +14,7 @@ from brrp_cli.shapes import solids
 unit = st.lists(st.floats(-1, 1), min_size=3, max_size=3).filter(lambda v: np.linalg.norm(v) > 0.1)
 
 
+@settings(deadline=None)
 @given(unit, unit)
 def test_axes_are_a_rotation_with_z_up(up, ahead):
     axes = body_axes(np.array(up), np.array(ahead))
@@ -33,6 +34,7 @@ def test_the_inertia_of_a_box_is_the_books():
     np.testing.assert_allclose(inertia, np.diag(expected), rtol=1e-9, atol=1e-12)
 
 
+@settings(deadline=None)
 @given(st.floats(-0.05, 0.05))
 def test_a_body_is_lifted_by_what_lies_below_the_table(height):
     mesh = solids.box(0.1, 0.1, 0.1)

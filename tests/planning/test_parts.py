@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 import trimesh
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from brrp_cli.planning.parts import COACD, HULL, convex_parts, cover, hull_corners, outside_hull
@@ -40,6 +40,7 @@ def test_coacd_keeps_the_channel_open():
     assert all(np.array_equal(a, b) for a, b in zip(parts, again, strict=True))
 
 
+@settings(deadline=None)
 @given(st.integers(0, 2**32 - 1))
 def test_cover_leaves_no_point_outside_and_loses_none(seed):
     rng = np.random.default_rng(seed)

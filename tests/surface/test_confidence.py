@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 import trimesh
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from made_result import posterior_on
@@ -77,6 +77,7 @@ def test_drawn_shapes_lie_inside_as_often_as_it_says(confidence):
     assert inside.mean() <= confidence + 0.03, "no smaller region would do"
 
 
+@settings(deadline=None)
 @given(
     arrays(np.float32, (3, 40), elements=st.floats(0, 1, width=32)),
     st.floats(0.5, 0.999),
