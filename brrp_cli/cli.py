@@ -18,6 +18,8 @@ COMMANDS = {
     "verify": ("verify", "Check every byte of a prior."),
     "frame": ("frame", "Turn colour and depth images into a frame; find the objects."),
     "reconstruct": ("reconstruct", "Turn a segmented RGBD frame into a closed mesh per object."),
+    "view": ("view", "Look at results in one HTML page, offline."),
+    "export": ("export", "Turn results into collision shapes: URDF, MJCF, a cuRobo world."),
     "fetch": ("fetch", "Bring CLIP, which retrieves objects by their look."),
     "eval": ("eval", "Measure methods on scenes whose truth is known."),
     "demo": ("demo", "Run the whole path on a made scene and score it."),

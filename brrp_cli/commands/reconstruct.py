@@ -10,10 +10,13 @@ from typing import TYPE_CHECKING
 import click
 from click.core import ParameterSource
 
+from brrp_cli.commands.export import CONFIDENCE, export
 from brrp_cli.commands.retriever_option import RetrieverName
 from brrp_cli.commands.weights_option import check_weights
 from brrp_cli.config import PRESETS, preset
 from brrp_cli.methods.registry import METHODS, RECONSTRUCTING
+from brrp_cli.planning.options import PlanOptions
+from brrp_cli.planning.parts import HOW, check_available
 from brrp_cli.progress import note
 from brrp_cli.retrieval.choose import RETRIEVERS, choose_retriever
 from brrp_cli.retrieval.clip_files import CLIP_DIR_VARIABLE
@@ -25,6 +28,7 @@ if TYPE_CHECKING:
     from brrp_cli.retrieval.base import Retriever
 
 SOME_FAILED = 3
+NO_COLLISION = "none"
 # Options that mean nothing to a method without a prior.
 OF_A_PRIOR = ("prior_path", "preset_name", "k", "retriever", "clip_dir")
 
@@ -63,6 +67,18 @@ OF_A_PRIOR = ("prior_path", "preset_name", "k", "retriever", "clip_dir")
 @click.option("--depth-scale", type=float, help="Raw depth times this is metres.")
 @click.option("--seed", type=int, default=0, show_default=True)
 @click.option("--device", type=click.Choice(["auto", "cpu", "cuda"]), default="auto")
+@click.option(
+    "--collision",
+    type=click.Choice([*HOW, NO_COLLISION]),
+    default=NO_COLLISION,
+    show_default=True,
+    help="Also what `brrp export` writes, into OUT/plan/.",
+)
+@click.option(
+    "--confidence",
+    type=CONFIDENCE,
+    help="With --collision: shapes inside which each object lies with this probability.",
+)
 @click.option("--overwrite", is_flag=True, help="Replace the output folder if it is there.")
 def command(
     frame_path: Path,
@@ -78,6 +94,8 @@ def command(
     depth_scale: float | None,
     seed: int,
     device: str,
+    collision: str,
+    confidence: float | None,
     overwrite: bool,
 ) -> None:
     """Turn a segmented RGBD frame into a closed mesh for every object.
@@ -92,12 +110,15 @@ def command(
       brrp reconstruct frame.npz --prior prior/ --preset paper -o out/ --seed 1
       brrp reconstruct frame.npz --method vprism
       brrp reconstruct frame.npz --method pointsdf --weights prior.safetensors
+      brrp reconstruct frame.npz --collision coacd --confidence 0.95
     """
     from brrp_cli.api import reconstruct
     from brrp_cli.frames.readers import read_frame
     from brrp_cli.surface.results import check_output, write_results
+    from brrp_cli.surface.stored import open_result
 
     check_weights([method], [] if weights is None else [weights])
+    check_collision(collision, confidence)
     uses_prior = METHODS[method].uses_prior
     if not uses_prior:
         refuse_options(method, device)
@@ -131,8 +152,18 @@ def command(
         f"Wrote {done} of {len(result.objects)} objects, metres, {coordinates} frame: {output}/ "
         f"({meshes}posterior.h5, result.json, preview.png)"
     )
+    if done and collision != NO_COLLISION:
+        options = PlanOptions(collision, confidence, seed=seed)
+        export(open_result(output), None, options, overwrite=False)
     if done < len(result.objects):
         sys.exit(SOME_FAILED)
+
+
+def check_collision(collision: str, confidence: float | None) -> None:
+    """UsageError for --confidence alone; DependencyError where a library is missing."""
+    if collision == NO_COLLISION and confidence is not None:
+        raise click.UsageError(f"--confidence is of collision shapes: add --collision {HOW[0]}")
+    check_available(collision)
 
 
 def refuse_options(method: str, device: str) -> None:

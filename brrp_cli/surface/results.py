@@ -1,4 +1,5 @@
-"""The files of a reconstruction: meshes, one scene, the posterior, a record and a picture."""
+"""The files of a reconstruction: meshes, one scene, the posterior, a record, a picture, and the
+frame that it is of."""
 
 from __future__ import annotations
 
@@ -13,6 +14,7 @@ from numpy.typing import NDArray
 from brrp_cli.errors import OutputError
 from brrp_cli.files import atomic_folder, check_writable, refuse_folder
 from brrp_cli.frames.frame import Frame
+from brrp_cli.frames.npz import save_frame
 from brrp_cli.geometry import transform_points
 from brrp_cli.inference.posterior_file import save_posteriors
 from brrp_cli.methods.base import ObjectReconstruction, Retrieved, Surface
@@ -27,6 +29,8 @@ if TYPE_CHECKING:
 
 SCHEMA = 1
 RECORD = "result.json"
+FRAME = "frame.npz"
+POSTERIOR = "posterior.h5"
 LIBRARIES = ("torch", "open3d", "numpy", "scipy", "scikit-image", "trimesh", "h5py", "onnxruntime")
 
 
@@ -51,7 +55,8 @@ def write_results(
         if meshes:
             _scene(meshes).export(partial / "scene.glb")
         posteriors = {o.object_id: o.posterior for o in result.objects if o.posterior is not None}
-        save_posteriors(posteriors, partial / "posterior.h5")
+        save_posteriors(posteriors, partial / POSTERIOR)
+        save_frame(result.frame, partial / FRAME)
         record = json.dumps(result_record(result, frame), indent=2) + "\n"
         (partial / RECORD).write_text(record)
         caption = (

@@ -106,6 +106,7 @@ def test_writes_everything_and_says_so(out):
     assert {p.name for p in folder.iterdir()} == {
         "object_250.ply",
         "object_-7.ply",
+        "frame.npz",
         "scene.glb",
         "posterior.h5",
         "result.json",
@@ -258,7 +259,7 @@ def test_where_no_object_gets_a_surface_the_record_is_written_all_the_same(
     assert "object 12: too_few_points  5 " in output and "are needed" in output
     assert "Wrote 0 of 1 objects" in output and "no mesh: result.json says why" in output
     names = {path.name for path in (tmp_path / "out").iterdir()}
-    assert names == {"posterior.h5", "result.json", "preview.png"}
+    assert names == {"frame.npz", "posterior.h5", "result.json", "preview.png"}
     record = json.loads((tmp_path / "out" / "result.json").read_text())
     assert [(o["id"], o["status"], o["mesh"]) for o in record["objects"]] == [
         (SPECK, "too_few_points", None)
