@@ -10,17 +10,24 @@ give the same bytes.
 from __future__ import annotations
 
 import json
+import re
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
 from brrp_cli.errors import PriorError
-from brrp_cli.files import write_bytes
+from brrp_cli.files import parse_json, write_bytes
+from brrp_cli.prior.find import safe_name
 from brrp_cli.prior.plan import APPEARANCE_NAME, SHARD_NAME
 
 SCHEMA = 2
 KIND = "brrp-prior"
 FILE = "manifest.json"
+# 50,000 objects take 75 MB.
+MAX_BYTES = 2**30
+# A shard of 16 objects with a million samples each takes 300 MB.
+MAX_SHARD_BYTES = 2**31
+_SHA256 = re.compile(r"[0-9a-f]{64}")
 
 
 class ForeignManifestError(PriorError):
@@ -105,7 +112,8 @@ def read_manifest(folder: Path) -> Manifest:
 
 
 def read_bytes(folder: Path) -> bytes:
-    """The manifest's bytes. Errors: PriorError for a folder that is no prior or cannot be read."""
+    """The manifest's bytes. Errors: PriorError for a folder that is no prior, or a manifest that
+    cannot be read or is far too large."""
     path = folder / FILE
     if not path.is_file():
         raise PriorError(
@@ -115,15 +123,18 @@ def read_bytes(folder: Path) -> bytes:
             fix="make one: brrp build-prior MESHES/ -o PRIOR/",
         )
     try:
+        size = path.stat().st_size
+        if size > MAX_BYTES:
+            raise ValueError(f"{size} bytes, at most {MAX_BYTES} are read")
         return path.read_bytes()
-    except OSError as error:
+    except (OSError, ValueError) as error:
         raise _unusable(path, error) from error
 
 
 def parse_manifest(data: bytes, path: Path) -> Manifest:
     """The manifest with these bytes, checked; `path` is for messages. Errors: PriorError."""
     try:
-        table = json.loads(data.decode("utf-8"))
+        table = parse_json(data.decode("utf-8"))
         _refuse_foreign(table, path)
         manifest = Manifest(
             parameters=dict(table["parameters"]),
@@ -132,9 +143,10 @@ def parse_manifest(data: bytes, path: Path) -> Manifest:
             failed=[Failure(**entry) for entry in table["failed"]],
             appearance=ShardEntry(**table["appearance"]) if "appearance" in table else None,
         )
+        _check_text(manifest)
         check_files(manifest.shards, manifest.appearance)
         _check_objects(manifest)
-    except (ValueError, KeyError, TypeError, AttributeError) as error:
+    except (ValueError, KeyError, TypeError, AttributeError, OverflowError) as error:
         raise _unusable(path, error) from error
     return manifest
 
@@ -173,6 +185,32 @@ def check_files(shards: list[ShardEntry], appearance: ShardEntry | None) -> None
             raise ValueError(f"a shard named {shard.file!r}")
     if appearance and not APPEARANCE_NAME.fullmatch(appearance.file):
         raise ValueError(f"a file of descriptors named {appearance.file!r}")
+    for entry in [*shards, *([appearance] if appearance else [])]:
+        if not _SHA256.fullmatch(entry.sha256):
+            raise ValueError(f"{entry.file} with the sum {entry.sha256!r}")
+        if type(entry.bytes) is not int or not 0 <= entry.bytes <= MAX_SHARD_BYTES:
+            raise ValueError(f"{entry.file} of {entry.bytes!r} bytes")
+
+
+def _check_text(manifest: Manifest) -> None:
+    """TypeError unless what is text is text, and records are tables; ValueError for a name that
+    would lead elsewhere in a shard or in a file system."""
+    for entry in manifest.objects:
+        texts = (entry.name, entry.description, entry.source, entry.input_sha256, entry.shard)
+        if not all(isinstance(text, str) for text in texts) or not isinstance(entry.record, dict):
+            raise TypeError(f"an object of other types: {entry.name!r}")
+        if safe_name(entry.name) != entry.name:
+            raise ValueError(f"an object named {entry.name!r}")
+        made_with = entry.record.get("made_with", {})
+        if not isinstance(made_with, dict) or not all(
+            isinstance(version, str) for version in made_with.values()
+        ):
+            raise TypeError(f"{entry.name} made with {made_with!r}")
+    for failure in manifest.failed:
+        if not all(
+            isinstance(text, str) for text in (failure.name, failure.source, failure.reason)
+        ):
+            raise TypeError(f"a failure of other types: {failure.name!r}")
 
 
 def _check_objects(manifest: Manifest) -> None:
