@@ -19,6 +19,7 @@ from brrp_cli.errors import OutputError
 # What file systems without such a thing say.
 _NOT_SUPPORTED = {errno.EINVAL, errno.ENOSYS, errno.ENOTSUP}
 _RENAME_EXCHANGE = 2
+_DIGITS = 18
 _AT_FDCWD = -100
 
 
@@ -31,9 +32,16 @@ def sha256_file(path: Path) -> str:
 def parse_json(text: str | bytes) -> Any:
     """JSON from a file that may be anything. Errors: ValueError."""
     try:
-        return json.loads(text)
+        return json.loads(text, parse_int=_int64)
     except RecursionError as error:
         raise ValueError("brackets within brackets without an end") from error
+
+
+def _int64(digits: str) -> int:
+    """What no NumPy integer and no float can hold is no number of ours."""
+    if len(digits) > _DIGITS:
+        raise ValueError(f"an integer of {len(digits)} digits")
+    return int(digits)
 
 
 def fsync_folder(folder: Path) -> None:

@@ -16,8 +16,8 @@ _FLETCHER32_BYTES = 4
 
 
 def check_chunks(data: h5py.Dataset, where: str) -> None:
-    """ValueError unless each chunk that is stored unpacks to its size, by the filters that brrp
-    writes with: shuffle, gzip, fletcher32, none of them left out."""
+    """ValueError or zlib.error unless each chunk that is stored unpacks to its size, by the filters
+    that brrp writes with: shuffle, gzip, fletcher32, none of them left out."""
     from h5py import h5z
 
     layout = data.id.get_create_plist()
@@ -33,7 +33,7 @@ def check_chunks(data: h5py.Dataset, where: str) -> None:
         chunk = data.id.get_chunk_info(index)
         if chunk.filter_mask:
             raise ValueError(f"{where}: a chunk without its checksum")
-        if packed and chunk.size > 2 * size + 1024:
+        if chunk.size > 2 * size + 1024:
             raise ValueError(f"{where}: a chunk of {chunk.size} bytes")
         if packed:
             _, stored = data.id.read_direct_chunk(chunk.chunk_offset)

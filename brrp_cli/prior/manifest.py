@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import json
 import re
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, astuple, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -207,9 +207,7 @@ def _check_text(manifest: Manifest) -> None:
         ):
             raise TypeError(f"{entry.name} made with {made_with!r}")
     for failure in manifest.failed:
-        if not all(
-            isinstance(text, str) for text in (failure.name, failure.source, failure.reason)
-        ):
+        if not all(isinstance(text, str) for text in astuple(failure)):
             raise TypeError(f"a failure of other types: {failure.name!r}")
 
 

@@ -32,6 +32,7 @@ from __future__ import annotations
 import hashlib
 import json
 import math
+import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -133,6 +134,7 @@ _DAMAGE = (
     IndexError,
     OverflowError,
     MemoryError,
+    zlib.error,
 )
 
 
