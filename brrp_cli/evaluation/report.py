@@ -174,7 +174,7 @@ def _difference_table(found: Differences, labels: Labels) -> str:
 
 
 def _cost_table(summaries: Sequence[VariantSummary], labels: Labels) -> str:
-    show: Callable[[float], str] = lambda s: "–" if math.isnan(s) else f"{s:.2f}"
+    show: Callable[[float], str] = lambda s: "–" if math.isnan(s) else f"{s:.2f}"  # noqa: E731
     rows = [
         [
             labels[s.variant],

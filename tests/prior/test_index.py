@@ -78,7 +78,7 @@ def test_another_manifest_than_that_which_was_opened_is_told(prior_folder: Path)
     prior = open_prior(prior_folder)
     (prior_folder / FILE).write_bytes((prior_folder / FILE).read_bytes() + b"\n")
     with pytest.raises(PriorError, match="built again"):
-        prior.manifest
+        prior.manifest  # noqa: B018
     assert open_prior(prior_folder).manifest.objects
 
 
