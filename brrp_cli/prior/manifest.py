@@ -3,12 +3,14 @@
 Keys: kind, schema, parameters, objects (sorted by name; each with name, description, source,
 input_sha256, shard, half_extent, record), shards (file, sha256, bytes), appearance (file, sha256,
 bytes; see sidecar.py), failed (name, source, reason), libraries (versions that the objects were
-made with). Schema 1 had no appearance. No times and no absolute paths: the same seed and meshes
+made with), content_sha256 (of the file's bytes with zeros in its place; a manifest of an older brrp
+has none). Schema 1 had no appearance. No times and no absolute paths: the same seed and meshes
 give the same bytes.
 """
 
 from __future__ import annotations
 
+import hashlib
 import json
 import re
 from dataclasses import asdict, astuple, dataclass
@@ -27,6 +29,8 @@ FILE = "manifest.json"
 MAX_BYTES = 2**30
 # A shard of 16 objects with a million samples each takes 300 MB.
 MAX_SHARD_BYTES = 2**31
+_NOTHING = 64 * "0"
+_OWN_SUM = re.compile(rb'"content_sha256": "([0-9a-f]{64})"')
 _SHA256 = re.compile(r"[0-9a-f]{64}")
 
 
@@ -88,7 +92,9 @@ class Manifest:
         }
         if self.appearance is not None:
             table["appearance"] = asdict(self.appearance)
-        return (json.dumps(table, indent=1, ensure_ascii=False, sort_keys=True) + "\n").encode()
+        table["content_sha256"] = _NOTHING
+        text = json.dumps(table, indent=1, ensure_ascii=False, sort_keys=True) + "\n"
+        return text.replace(_NOTHING, _sum(text.encode()), 1).encode()
 
     @property
     def libraries(self) -> dict[str, list[str]]:
@@ -134,6 +140,7 @@ def read_bytes(folder: Path) -> bytes:
 def parse_manifest(data: bytes, path: Path) -> Manifest:
     """The manifest with these bytes, checked; `path` is for messages. Errors: PriorError."""
     try:
+        _check_sum(data)
         table = parse_json(data.decode("utf-8"))
         _refuse_foreign(table, path)
         manifest = Manifest(
@@ -149,6 +156,20 @@ def parse_manifest(data: bytes, path: Path) -> Manifest:
     except (ValueError, KeyError, TypeError, AttributeError, OverflowError) as error:
         raise _unusable(path, error) from error
     return manifest
+
+
+def _sum(data: bytes) -> str:
+    return hashlib.sha256(data).hexdigest()
+
+
+def _check_sum(data: bytes) -> None:
+    """ValueError if the manifest tells a sum of its own that it does not have."""
+    told = _OWN_SUM.search(data)
+    if told is None:
+        return
+    start, end = told.span(1)
+    if _sum(data[:start] + _NOTHING.encode() + data[end:]) != told[1].decode():
+        raise ValueError("bytes that do not have the manifest's own sha256")
 
 
 def _unusable(path: Path, error: Exception) -> PriorError:

@@ -239,3 +239,50 @@ def test_a_limit_on_the_size_of_files_is_told_and_removed(
         assert in_a_process(work) == 0
         build_prior(sources[0], out, TINY, workers=1)
         assert prior_bytes(out) == prior_bytes(whole[0])
+
+
+def small_disk(folder: Path, kilobytes: int) -> bool:
+    """Mount a file system of that size there, for this process alone; whether that is allowed."""
+    import ctypes
+
+    libc = ctypes.CDLL(None, use_errno=True)
+    user, mount = 0x10000000, 0x00020000
+    uid, gid = os.getuid(), os.getgid()
+    if libc.unshare(user | mount) != 0:
+        return False
+    try:
+        Path("/proc/self/setgroups").write_text("deny")
+        Path("/proc/self/uid_map").write_text(f"0 {uid} 1")
+        Path("/proc/self/gid_map").write_text(f"0 {gid} 1")
+    except OSError:
+        return False
+    options = f"size={kilobytes}k".encode()
+    return libc.mount(b"none", os.fsencode(folder), b"tmpfs", 0, options) == 0
+
+
+def test_a_full_disk_is_told_and_leaves_no_rest(sources: tuple[Path, Path], tmp_path: Path) -> None:
+    """A real one: a file system in memory, from too small for one shard to too small for the last
+    file."""
+    disk = tmp_path / "disk"
+    disk.mkdir()
+    told = tmp_path / "told"
+
+    def work(kilobytes: int) -> None:
+        if not small_disk(disk, kilobytes):
+            told.write_text("no mount")
+            return
+        try:
+            build_prior(sources[0], disk / "prior", TINY, workers=1)
+            told.write_text("built")
+        except OutputError as error:
+            rest = [p.name for p in disk.rglob("*.partial*")]
+            there = (disk / "prior" / FILE).exists()
+            told.write_text(f"{error.found} {rest} {there}")
+
+    for kilobytes in (64, 100, 200, 260, 300):
+        assert in_a_process(lambda size=kilobytes: work(size)) == 0
+        if told.read_text() == "no mount":
+            pytest.skip("mounting is not allowed here")
+        assert told.read_text() == "No space left on device [] False", kilobytes
+    assert in_a_process(lambda: work(10_000)) == 0
+    assert told.read_text() == "built"
