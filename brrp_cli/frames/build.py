@@ -132,6 +132,13 @@ def _points_metres(raw: NDArray[Any], scale: float | None, source: Path | None) 
     _numbers(raw, "xyz", source)
     points = _scaled(raw, raw[..., 2], "xyz", scale, source)
     points[~(np.isfinite(points).all(axis=-1) & (points[..., 2] > 0))] = np.nan
+    if not np.isfinite(points).any():
+        raise FrameError(
+            "xyz has no valid pixel",
+            where=source,
+            expected="some points with x, y and z",
+            found="NaN or inf in each of them",
+        )
     return points
 
 

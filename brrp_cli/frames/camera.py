@@ -102,10 +102,11 @@ def fit_intrinsics(
     K = np.eye(3)
     residuals = []
     for axis, pixel in enumerate((u, v)):
-        ratio = seen[:, axis] / seen[:, 2]
+        with np.errstate(over="ignore"):
+            ratio = seen[:, axis] / seen[:, 2]
         if given is not None:
             f, c = given[axis, axis], given[axis, 2]
-        elif np.ptp(pixel) < 2 or np.ptp(ratio) == 0:
+        elif np.ptp(pixel) < 2 or not 0 < np.ptp(ratio) < np.inf:
             f, c = np.nan, np.nan
         else:
             f, c = np.polyfit(ratio, pixel, 1)

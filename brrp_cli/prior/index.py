@@ -21,6 +21,7 @@ from brrp_cli.errors import OutputError
 from brrp_cli.files import parse_json, sha256_file, write_bytes
 from brrp_cli.prior.manifest import (
     FILE,
+    MAX_BYTES,
     Manifest,
     ShardEntry,
     check_files,
@@ -110,7 +111,9 @@ def _kept(folder: Path) -> Index | None:
         if hashlib.sha256(line).hexdigest().encode() != checksum:
             return None
         table = parse_json(line)
-        if table.pop("schema") != SCHEMA or table["digest"] != sha256_file(folder / FILE):
+        if table.pop("schema") != SCHEMA or (folder / FILE).stat().st_size > MAX_BYTES:
+            return None
+        if table["digest"] != sha256_file(folder / FILE):
             return None
         appearance = table.pop("appearance")
         shards = [ShardEntry(*row) for row in table.pop("shards")]

@@ -28,6 +28,7 @@ from brrp_cli.prior.store import open_prior, verify_prior
 
 NAME = "red_box"
 MEGABYTES, SECONDS = 200, 5
+SHARD, LOOKS = "shards/shard-0123456789abcdef.h5", "appearance-0123456789abcdef.npy"
 
 
 def forge(folder: Path, change: Callable[[h5py.File], None]) -> None:
@@ -117,16 +118,18 @@ def test_no_other_file_is_read(prior_folder: Path, kind: str) -> None:
     assert "A shard is damaged" in told, told
 
 
-def bomb(file: h5py.File) -> None:
+def bomb(file: h5py.File, size: int = 250_000_000) -> None:
     """250 kB that unpack to 250 MB, in one chunk of a plain shape."""
     options = {"chunks": (400, 3), "compression": "gzip", "shuffle": True}
     data = put(file, "samples", shape=(400, 3), dtype="<f4", **options)
     # HDF5 looks at the checksum only once all is unpacked.
-    data.id.write_direct_chunk((0, 0), zlib.compress(bytes(250_000_000)) + bytes(4))
+    data.id.write_direct_chunk((0, 0), zlib.compress(bytes(size)) + bytes(4))
 
 
-def long_file_of_nothing(file: h5py.File) -> None:
-    file.create_dataset("padding", (10**6,), "u1", chunks=None)
+def group_for_array(file: h5py.File) -> None:
+    group = file[f"objects/{NAME}"]
+    del group["box"]
+    group.create_group("box")
 
 
 HOSTILE: dict[str, tuple[Callable[[h5py.File], None], str]] = {
@@ -145,7 +148,8 @@ HOSTILE: dict[str, tuple[Callable[[h5py.File], None], str]] = {
         ],
         "A shard is damaged",
     ),
-    "a bomb": (bomb, "does not unpack"),
+    "a bomb": (bomb, "a chunk of 2"),
+    "a small bomb": (lambda f: bomb(f, 8_000_000), "does not unpack"),
     "chunks of one row": (
         lambda f: put(f, "samples", shape=(5_000_000, 3), dtype="<f4", chunks=(1, 3)),
         "chunks of",
@@ -248,7 +252,7 @@ def test_a_sparse_file_of_a_terabyte_is_not_summed(prior_folder: Path) -> None:
 
 MANIFESTS: dict[str, Callable[[dict], object]] = {
     "a path upwards": lambda t: t["shards"][0].update(file="shards/../../x.h5"),
-    "an absolute path": lambda t: t["shards"][0].update(file="/shards/shard-0123456789abcdef.h5"),
+    "an absolute path": lambda t: t["shards"][0].update(file=f"/{SHARD}"),
     "a path with a newline": lambda t: t["shards"][0].update(
         file="shards/shard-0123456789abcdef.h5\n"
     ),
