@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brrp_cli.config import SurfaceConfig
+from brrp_cli.finite import check_finite
 from brrp_cli.methods.base import Axes, OccupancyPosterior, Surface
 
 
@@ -22,12 +23,14 @@ def extract_surface(
 
     observed : (n, 3) points of the object, metres, camera frame. Parts of the level set that no
     observed point is near are dropped: where neither rays nor prior samples reach, the map keeps
-    the noise that the particles started from. Returns None when nothing is left.
+    the noise that the particles started from. Returns None when nothing is left. Errors: BrrpError
+    if the posterior is not finite.
     """
     from skimage.measure import marching_cubes
 
     axes = lattice_axes(posterior.bounds, config.spacing)
     volume = posterior.probability_volume(axes)
+    check_finite("The posterior", occupancy=volume)
     origin = np.array([axis[0] for axis in axes])
     kept = _near_observed(volume >= config.level, (observed - origin) / config.spacing, config)
     if not kept.any():
@@ -37,12 +40,9 @@ def extract_surface(
     volume = np.pad(volume, 1)
     vertices, faces, _, _ = marching_cubes(volume, config.level, gradient_direction="ascent")
     vertices = (vertices.astype(np.float64) - 1) * config.spacing + origin
-    return Surface(
-        vertices,
-        faces.astype(np.int64),
-        posterior.surface_uncertainty(vertices),
-        posterior.surface_unit,
-    )
+    uncertainty = posterior.surface_uncertainty(vertices)
+    check_finite("The surface", vertices=vertices, uncertainty=uncertainty)
+    return Surface(vertices, faces.astype(np.int64), uncertainty, posterior.surface_unit)
 
 
 def _near_observed(

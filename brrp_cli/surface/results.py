@@ -27,6 +27,8 @@ if TYPE_CHECKING:
 
 SCHEMA = 1
 RECORD = "result.json"
+# Metres; vertices are single precision, which has steps of a tenth of a millimetre there.
+FARTHEST_ORIGIN = 1000.0
 LIBRARIES = ("torch", "open3d", "numpy", "scipy", "scikit-image", "trimesh", "h5py", "onnxruntime")
 
 
@@ -52,7 +54,7 @@ def write_results(
             _scene(meshes).export(partial / "scene.glb")
         posteriors = {o.object_id: o.posterior for o in result.objects if o.posterior is not None}
         save_posteriors(posteriors, partial / "posterior.h5")
-        record = json.dumps(result_record(result, frame), indent=2) + "\n"
+        record = json.dumps(result_record(result, frame), indent=2, allow_nan=False) + "\n"
         (partial / RECORD).write_text(record)
         caption = (
             f"retrieved by {result.retriever}" if result.retriever else f"{result.method}, no prior"
@@ -86,6 +88,15 @@ def T_frame_cam(seen: Frame, frame: str) -> NDArray[np.float64]:
             where=seen.source,
             expected="the key T_world_cam, (4, 4)",
             fix="add it to the frame, or ask for --frame camera",
+        )
+    distance = float(np.linalg.norm(seen.T_world_cam[:3, 3]))
+    if distance > FARTHEST_ORIGIN:
+        raise OutputError(
+            "The world's origin is too far away for meshes in single precision",
+            where=seen.source,
+            expected=f"at most {FARTHEST_ORIGIN:g} m from the camera",
+            found=f"{distance:g} m",
+            fix="ask for --frame camera, or give T_world_cam with a nearer origin",
         )
     return seen.T_world_cam
 
