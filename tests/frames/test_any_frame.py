@@ -130,39 +130,13 @@ def test_good_types_with_any_numbers_become_a_frame_or_a_frame_error(depth, mask
             return
 
 
+KEYS = """fx fy cx cy K width height depth_scale id mesh_path position orientation scale 0 cup
+kind schema parameters objects shards failed appearance name sha256 bytes file record"""
+
+
 def texts() -> st.SearchStrategy[bytes]:
     leaves = st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=8)
-    keys = st.sampled_from(
-        [
-            "fx",
-            "fy",
-            "cx",
-            "cy",
-            "K",
-            "width",
-            "height",
-            "depth_scale",
-            "id",
-            "mesh_path",
-            "position",
-            "orientation",
-            "scale",
-            "0",
-            "cup",
-            "kind",
-            "schema",
-            "parameters",
-            "objects",
-            "shards",
-            "failed",
-            "appearance",
-            "name",
-            "sha256",
-            "bytes",
-            "file",
-            "record",
-        ]
-    )
+    keys = st.sampled_from(KEYS.split())
     tree = st.recursive(
         leaves, lambda inner: st.lists(inner, max_size=4) | st.dictionaries(keys, inner, max_size=6)
     )
