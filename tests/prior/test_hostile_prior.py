@@ -219,11 +219,8 @@ def test_a_forged_shard_is_one_message_in_bounded_time_and_memory(
     assert message.count("\n") < 6
 
 
-@pytest.mark.parametrize("key", ARRAYS)
+@pytest.mark.parametrize("key", [k for k, (dtype, _) in ARRAYS.items() if "f" in dtype])
 def test_numbers_that_are_no_numbers_never_leave_a_shard(prior_folder: Path, key: str) -> None:
-    if np.dtype(ARRAYS[key][0]).kind != "f":
-        return
-
     def change(file: h5py.File) -> None:
         data = file[f"objects/{NAME}/{key}"][...]
         data.flat[data.size // 2] = np.nan if data.size % 2 else np.inf
