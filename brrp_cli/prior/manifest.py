@@ -30,7 +30,8 @@ MAX_BYTES = 2**30
 # A shard of 16 objects with a million samples each takes 300 MB.
 MAX_SHARD_BYTES = 2**31
 _NOTHING = 64 * "0"
-_OWN_SUM = re.compile(rb'"content_sha256": "([0-9a-f]{64})"')
+# Of the top level alone, as `as_bytes` sets it.
+_OWN_SUM = re.compile(rb'\n "content_sha256": "([0-9a-f]{64})"')
 _SHA256 = re.compile(r"[0-9a-f]{64}")
 
 
@@ -94,7 +95,8 @@ class Manifest:
             table["appearance"] = asdict(self.appearance)
         table["content_sha256"] = _NOTHING
         text = json.dumps(table, indent=1, ensure_ascii=False, sort_keys=True) + "\n"
-        return text.replace(_NOTHING, _sum(text.encode()), 1).encode()
+        key = '\n "content_sha256": "'
+        return text.replace(key + _NOTHING, key + _sum(text.encode()), 1).encode()
 
     @property
     def libraries(self) -> dict[str, list[str]]:

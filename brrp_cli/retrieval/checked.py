@@ -10,7 +10,7 @@ from brrp_cli.frames.frame import Frame
 from brrp_cli.retrieval.base import Retriever
 
 # Sums of many rounded numbers miss 1 by a little.
-ROUNDING = 1e-6
+ROUNDING = 1e-3
 
 
 class CheckedRetriever:
