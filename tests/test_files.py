@@ -180,10 +180,10 @@ def test_results_of_another_user_group_are_readable(tmp_path: Path) -> None:
 def result_folder(out: Path, text: str) -> None:
     """Results as a command writes them: several files, over what was there."""
     with atomic_folder(out, overwrite=True, mark=MARK) as partial:
-        (partial / MARK).write_text(text)
+        (partial / MARK).write_bytes(text.encode())
         (partial / "meshes").mkdir()
         for i in range(3):
-            (partial / "meshes" / f"{i}.ply").write_text(text * 1000)
+            (partial / "meshes" / f"{i}.ply").write_bytes(1000 * text.encode())
 
 
 def whole_result(out: Path, text: str) -> bool:
@@ -204,7 +204,7 @@ def test_results_are_whole_or_not_there_wherever_the_process_is_killed(
     steps = Steps(tmp_path)
     with watched(steps):
         result_folder(out, "new")
-    assert len(steps.done) >= 12
+    assert len(steps.done) >= 18
     for number in range(len(steps.done)):
         shutil.rmtree(tmp_path / "here", ignore_errors=True)
         if over:

@@ -9,6 +9,9 @@ from brrp_cli.config import SurfaceConfig
 from brrp_cli.finite import check_finite
 from brrp_cli.methods.base import Axes, OccupancyPosterior, Surface
 
+# How far, at least, the occupancy of what is inside lies above the level: 10 micrometres.
+_CLEAR = 1e-3
+
 
 def lattice_axes(bounds: NDArray[np.floating], spacing: float) -> Axes:
     """Coordinates along x, y and z of a lattice that fills a box (2, 3), metres."""
@@ -37,6 +40,8 @@ def extract_surface(
         return None
     # What was dropped must not leave a surface; a border of zeros closes what touches the bounds.
     volume = np.where((volume >= config.level) & ~kept, 0.0, volume)
+    # A node on the level itself is a surface without volume, or none at all.
+    volume = np.where(kept, np.maximum(volume, config.level + _CLEAR), volume)
     volume = np.pad(volume, 1)
     vertices, faces, _, _ = marching_cubes(volume, config.level, gradient_direction="ascent")
     vertices = (vertices.astype(np.float64) - 1) * config.spacing + origin

@@ -189,9 +189,8 @@ GOOD_MANIFEST = {
 def places(value, path=()):
     """The path of every value in a table."""
     yield path
-    items = value.items() if isinstance(value, dict) else enumerate(value)
     if isinstance(value, dict | list):
-        for key, inner in items:
+        for key, inner in value.items() if isinstance(value, dict) else enumerate(value):
             yield from places(inner, (*path, key))
 
 

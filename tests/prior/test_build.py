@@ -188,6 +188,11 @@ def uninterrupted(boxes: Path, small: BuildParameters, tmp_path_factory) -> dict
     return prior_bytes(out)
 
 
+def hears_ctrl_c() -> None:
+    """A shell lets its background processes, and theirs, ignore it."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+
+
 @pytest.mark.parametrize("kill", [signal.SIGKILL, signal.SIGTERM, signal.SIGINT])
 def test_a_killed_build_goes_on_to_the_same_bytes(
     kill: signal.Signals,
@@ -202,7 +207,11 @@ def test_a_killed_build_goes_on_to_the_same_bytes(
     prior = tmp_path / "prior"
     environment = {**os.environ, "PYTHONPATH": str(Path(build.__file__).parents[2])}
     with subprocess.Popen(
-        [sys.executable, script, boxes, prior], env=environment, stdout=subprocess.PIPE, text=True
+        [sys.executable, script, boxes, prior],
+        env=environment,
+        stdout=subprocess.PIPE,
+        text=True,
+        preexec_fn=hears_ctrl_c,
     ) as process:
         while not list(prior.glob("shards/shard-*.h5")) and process.poll() is None:
             time.sleep(0.01)

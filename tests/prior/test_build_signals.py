@@ -76,6 +76,11 @@ def wanted(boxes: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, b
     return prior_bytes(out)
 
 
+def hears_ctrl_c() -> None:
+    """A shell lets its background processes, and theirs, ignore it."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+
+
 def start(script: Path, boxes: Path, out: Path) -> subprocess.Popen[str]:
     return subprocess.Popen(
         [sys.executable, script, boxes, out],
@@ -83,6 +88,7 @@ def start(script: Path, boxes: Path, out: Path) -> subprocess.Popen[str]:
         stderr=subprocess.PIPE,
         text=True,
         start_new_session=True,
+        preexec_fn=hears_ctrl_c,
     )
 
 

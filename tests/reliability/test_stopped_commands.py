@@ -32,6 +32,8 @@ def test_a_stopped_reconstruction_leaves_nothing(
         env={**os.environ, "PYTHONPATH": str(Path(brrp_cli.__file__).parents[1])},
         stderr=subprocess.PIPE,
         text=True,
+        # A shell lets its background processes, and theirs, ignore Ctrl-C.
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
     ) as process:
         assert process.stderr is not None
         assert "Method" in process.stderr.readline()
