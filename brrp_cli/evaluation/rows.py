@@ -13,13 +13,13 @@ import math
 import os
 from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 from filelock import FileLock
 
 from brrp_cli.evaluation.score_object import PROBABILITY_METRICS, REGIONS, SHAPE_METRICS
 from brrp_cli.evaluation.variants import Variant
-from brrp_cli.files import cannot_write, write_bytes
+from brrp_cli.files import cannot_write, parse_json, write_bytes
 
 Row = dict[str, Any]
 
@@ -46,6 +46,7 @@ RESULT = (
 STAGES = ("observation", "retrieval", "registration", "inference", "surface")
 COST = (*(f"seconds_{stage}" for stage in STAGES), "seconds_total", "peak_memory_mb")
 COLUMNS = (*OBJECT, *VARIANT, *RESULT, *COST)
+_NEEDED = ("scene", "object_id", "objects_in_view")
 
 
 class RowLog:
@@ -58,8 +59,9 @@ class RowLog:
         """Add rows, together, from any process. Errors: OutputError."""
         text = "".join(json.dumps(_plain(row)) + "\n" for row in rows)
         try:
-            with FileLock(self.path.with_name(".rows.lock")), self.path.open("ab") as stream:
-                stream.write(text.encode())
+            with FileLock(self.path.with_name(".rows.lock")), self.path.open("a+b") as stream:
+                # A full disk, or a kill, may have left a line without its end: no row goes onto it.
+                stream.write(b"\n" * _torn(stream) + text.encode())
                 stream.flush()
                 os.fsync(stream.fileno())
         except OSError as error:
@@ -71,11 +73,30 @@ class RowLog:
             return []
         lines = self.path.read_bytes().split(b"\n")
         # What follows the last newline was never finished.
-        return [_restored(json.loads(line)) for line in lines[:-1] if line.strip()]
+        rows = [_row(line) for line in lines[:-1]]
+        return [_restored(row) for row in rows if row is not None]
 
     def replace(self, rows: Iterable[Row]) -> None:
         """Keep these rows alone."""
         write_bytes(self.path, "".join(json.dumps(_plain(r)) + "\n" for r in rows).encode())
+
+
+def _torn(stream: BinaryIO) -> bool:
+    """Whether a file that is open to be appended to ends in the middle of a line."""
+    if stream.seek(0, os.SEEK_END) == 0:
+        return False
+    stream.seek(-1, os.SEEK_END)
+    return stream.read(1) != b"\n"
+
+
+def _row(line: bytes) -> Row | None:
+    """None for a line that was cut."""
+    try:
+        row = parse_json(line)
+    except ValueError:
+        return None
+    whole = isinstance(row, dict) and row.keys() >= {*VARIANT, *_NEEDED}
+    return row if whole else None
 
 
 def variant_of(row: Mapping[str, Any]) -> Variant:
