@@ -12,7 +12,7 @@ from eight_objects import NETWORK, write_scenes
 from brrp_cli.evaluation.scenes import Scene
 from brrp_cli.pointsdf.examples import Examples, Recipe, scene_examples
 
-STEPS, RATE = 300, 4e-3
+STEPS, RATE = 400, 2e-3
 
 
 @dataclass(frozen=True)
