@@ -12,6 +12,7 @@ from click.core import ParameterSource
 
 from brrp_cli.commands.export import CONFIDENCE, export
 from brrp_cli.commands.retriever_option import RetrieverName
+from brrp_cli.commands.weights_option import check_weights
 from brrp_cli.config import PRESETS, preset
 from brrp_cli.methods.registry import METHODS, RECONSTRUCTING
 from brrp_cli.planning.options import PlanOptions
@@ -41,7 +42,12 @@ OF_A_PRIOR = ("prior_path", "preset_name", "k", "retriever", "clip_dir")
     type=click.Choice(list(RECONSTRUCTING)),
     default="brrp",
     show_default=True,
-    help="vprism: one map of the whole frame, without a prior.",
+    help="vprism: one map of the whole frame, without a prior. pointsdf: a trained network.",
+)
+@click.option(
+    "--weights",
+    type=click.Path(path_type=Path),
+    help="What pointsdf was trained to: a file of tools/train_pointsdf.py.",
 )
 @click.option("--preset", "preset_name", type=click.Choice(list(PRESETS)), default="default")
 @click.option("--k", type=click.IntRange(min=1), help="Retrieved objects. [default: the preset's]")
@@ -79,6 +85,7 @@ def command(
     prior_path: Path | None,
     output: Path | None,
     method: str,
+    weights: Path | None,
     preset_name: str,
     k: int | None,
     retriever: str,
@@ -94,8 +101,8 @@ def command(
     """Turn a segmented RGBD frame into a closed mesh for every object.
 
     The prior is --prior, else BRRP_PRIOR, else the one in the user's data folder, else the
-    starter prior; --method vprism has none. Meshes are in metres, in the camera frame unless
-    --frame world is given.
+    starter prior; --method vprism and pointsdf have none. Meshes are in metres, in the camera frame
+    unless --frame world is given.
 
     \b
     Example:
@@ -103,6 +110,7 @@ def command(
       brrp reconstruct frame.npz --prior prior/ --preset paper -o out/ --seed 1
       brrp reconstruct frame.npz --method vprism
       brrp reconstruct frame.npz --collision coacd --confidence 0.95
+      brrp reconstruct frame.npz --method pointsdf --weights prior.safetensors
     """
     from brrp_cli.api import reconstruct
     from brrp_cli.frames.readers import read_frame
@@ -110,6 +118,7 @@ def command(
     from brrp_cli.surface.stored import open_result
 
     check_collision(collision, confidence)
+    check_weights([method], [] if weights is None else [weights])
     uses_prior = METHODS[method].uses_prior
     if not uses_prior:
         refuse_options(method, device)
@@ -123,9 +132,17 @@ def command(
     if uses_prior:
         prior, chosen = open_retrieval(prior_path, config, retriever, clip_dir, seed)
     else:
-        note(f"Method: {method}, without a prior")
+        trained = "" if weights is None else f", weights {weights}"
+        note(f"Method: {method}, without a prior{trained}")
     result = reconstruct(
-        frame, prior, method=method, config=config, retriever=chosen, seed=seed, device=device
+        frame,
+        prior,
+        method=method,
+        config=config,
+        retriever=chosen,
+        weights=weights,
+        seed=seed,
+        device=device,
     )
     write_results(result, output, frame=coordinates, overwrite=overwrite)
     report(result)
@@ -160,7 +177,7 @@ def refuse_options(method: str, device: str) -> None:
     ]
     if typed:
         raise click.UsageError(f"--method {method} has no prior, so leave out {', '.join(typed)}")
-    if device == "cuda":
+    if device == "cuda" and not METHODS[method].uses_cuda:
         raise click.UsageError(f"--method {method} runs on the CPU alone")
 
 
