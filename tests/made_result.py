@@ -10,7 +10,7 @@ import trimesh
 from table_scene import TABLE, in_camera, photograph, placed
 
 from brrp_cli.api import Reconstruction
-from brrp_cli.config import preset
+from brrp_cli.config import SurfaceConfig, preset
 from brrp_cli.inference.hinge import HingeGrid
 from brrp_cli.inference.hypothesis_posterior import HypothesisPosterior
 from brrp_cli.inference.mean import MeanLattice
@@ -83,7 +83,8 @@ def write_made_result(folder: Path, *, frame: str = "camera") -> Path:
     segmap = seen.segmap.copy()
     segmap[-2:, :2] = SPECK
     seen = replace(seen, segmap=segmap)
-    config = preset("default")
+    # At a half the mesh is the true surface.
+    config = replace(preset("default"), surface=SurfaceConfig(level=0.5))
     objects = [ObjectReconstruction(SPECK, TOO_FEW_POINTS, "4 valid depth points, 16 are needed")]
     for object_id, mesh in meshes.items():
         item = ObjectReconstruction(

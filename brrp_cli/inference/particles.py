@@ -15,7 +15,7 @@ def particle_volumes(posterior: OccupancyPosterior, axes: Axes) -> NDArray[np.fl
     """Occupancy probability (P, nx, ny, nz) of each particle on a lattice of camera-frame
     coordinates, metres; their mean over P is `posterior.probability_volume(axes)`.
 
-    V-PRISM has a density over weights and no particles: P is 1, and that is its mean.
+    V-PRISM and PointSDF have no particles: P is 1, and that is the mean.
     """
     if isinstance(posterior, HypothesisPosterior):
         logits = posterior.mean.volume(axes)[posterior.which]

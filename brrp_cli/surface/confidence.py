@@ -88,6 +88,8 @@ def confidence_surface(
     level = confidence_level(volumes, confidence)
     if level is None:
         return None
+    # The mesh is the best guess, at whatever level: it lies inside in any case.
+    level = min(level, config.level)
     mean = volumes.mean(axis=0)
     found = level_set(mean, axes, observed, level, config)
     if found is not None and margin > 0:

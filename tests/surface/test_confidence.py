@@ -15,7 +15,7 @@ from brrp_cli.surface.extract import extract_surface, lattice_axes
 
 CENTER = np.array([0.1, -0.05, 0.8])
 RADIUS, WIDTH = 0.03, 0.003
-CONFIG = SurfaceConfig(spacing=0.003)
+CONFIG = SurfaceConfig(level=0.5, spacing=0.003)
 
 
 def ball(center=CENTER, radius=RADIUS, width=WIDTH):
