@@ -23,7 +23,7 @@ from brrp_cli.files import cannot_write, parse_json, write_bytes
 
 Row = dict[str, Any]
 
-VARIANT = ("method", "preset", "k", "retriever", "shift", "weights")
+VARIANT = ("method", "preset", "k", "retriever", "weights", "shift")
 OBJECT = ("scene", "view", "object_id", "name", "visible_pixels", "objects_in_view")
 METRICS = (
     *SHAPE_METRICS,
@@ -60,8 +60,10 @@ class RowLog:
         text = "".join(json.dumps(_plain(row)) + "\n" for row in rows)
         try:
             with FileLock(self.path.with_name(".rows.lock")), self.path.open("a+b") as stream:
-                # A full disk, or a kill, may have left a line without its end: no row goes onto it.
-                stream.write(b"\n" * _torn(stream) + text.encode())
+                # A full disk, or a kill, may have left a line without its end: `read` did not count
+                # it, so that its row is here again.
+                _drop_unfinished(stream)
+                stream.write(text.encode())
                 stream.flush()
                 os.fsync(stream.fileno())
         except OSError as error:
@@ -81,12 +83,10 @@ class RowLog:
         write_bytes(self.path, "".join(json.dumps(_plain(r)) + "\n" for r in rows).encode())
 
 
-def _torn(stream: BinaryIO) -> bool:
-    """Whether a file that is open to be appended to ends in the middle of a line."""
-    if stream.seek(0, os.SEEK_END) == 0:
-        return False
-    stream.seek(-1, os.SEEK_END)
-    return stream.read(1) != b"\n"
+def _drop_unfinished(stream: BinaryIO) -> None:
+    """Cut what follows the last newline."""
+    stream.seek(0)
+    stream.truncate(stream.read().rfind(b"\n") + 1)
 
 
 def _row(line: bytes) -> Row | None:

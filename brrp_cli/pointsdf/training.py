@@ -111,13 +111,13 @@ class Training:
                 if not go_on():
                     self.save()
                     return False
-                loss = self._step(train, batches[step], step)
+                loss = self.step(train, batches[step], step)
                 state.losses.append(loss)
                 state.step += 1
                 stepped(loss)
                 if state.step % every == 0:
                     self.save()
-            self._settle(train, batches[:SETTLING])
+            self.settle(train, batches[:SETTLING])
             record = {
                 "epoch": state.epoch + 1,
                 "train_loss": float(np.mean(state.losses)),
@@ -186,7 +186,7 @@ class Training:
             )
         )
 
-    def _settle(self, train: Examples, batches: list[NDArray[np.int64]]) -> None:
+    def settle(self, train: Examples, batches: list[NDArray[np.int64]]) -> None:
         """Batch normalisation's statistics anew, as the means over these batches: the running ones
         lag behind weights that still move, which cost half of the accuracy in a short training.
         Training itself never reads them.
@@ -210,7 +210,8 @@ class Training:
         order = child_rng(self.config.seed, "order", epoch).permutation(count)
         return np.array_split(order, max(1, count // self.config.batch))
 
-    def _step(self, train: Examples, rows: NDArray[np.int64], step: int) -> float:
+    def step(self, train: Examples, rows: NDArray[np.int64], step: int) -> float:
+        """Step number `step` of this epoch, on these rows; gives its loss."""
         clouds, queries, labels = self._draw(train, rows, "step", step)
         torch.manual_seed(child_seed(self.config.seed, "dropout", self.progress.epoch, step))
         self.network.train()

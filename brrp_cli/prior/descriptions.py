@@ -46,7 +46,7 @@ def read_descriptions(path: Path) -> dict[str, str]:
             raise PriorError(
                 "Descriptions in an unknown format", where=path, expected=".toml, .json or .csv"
             )
-    except (OSError, ValueError) as error:
+    except (OSError, ValueError, csv.Error) as error:
         raise PriorError("Cannot read the descriptions", where=path, found=error) from error
     if isinstance(table, dict) and isinstance(table.get("descriptions"), dict):
         table = table["descriptions"]

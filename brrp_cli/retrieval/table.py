@@ -56,7 +56,7 @@ def _read(path: Path) -> dict[int, dict[str, Any]]:
         text = path.read_text(encoding="utf-8")
         table = _from_csv(text) if path.suffix.lower() == ".csv" else parse_json(text)
         return {int(object_id): dict(given) for object_id, given in table.items()}
-    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
+    except (OSError, ValueError, KeyError, TypeError, AttributeError, csv.Error) as error:
         raise RetrievalError(
             "The table of probabilities cannot be read",
             where=path,

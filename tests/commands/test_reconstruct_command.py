@@ -16,7 +16,6 @@ from PIL import Image
 
 from brrp_cli import load_frame, make_frame, open_posterior, open_prior, reconstruct
 from brrp_cli.cli import main
-from brrp_cli.config import preset
 from brrp_cli.config import Config, FeatureConfig, preset
 from brrp_cli.errors import PriorError
 from brrp_cli.frames.npz import save_frame
