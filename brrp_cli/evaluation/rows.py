@@ -23,7 +23,7 @@ from brrp_cli.files import cannot_write, write_bytes
 
 Row = dict[str, Any]
 
-VARIANT = ("method", "preset", "k", "retriever", "shift", "weights")
+VARIANT = ("method", "preset", "k", "retriever", "weights", "shift")
 OBJECT = ("scene", "view", "object_id", "name", "visible_pixels", "objects_in_view")
 METRICS = (
     *SHAPE_METRICS,
