@@ -12,7 +12,7 @@ from eight_objects import NETWORK, write_scenes
 from brrp_cli.evaluation.scenes import Scene
 from brrp_cli.pointsdf.examples import Examples, Recipe, scene_examples
 
-STEPS, RATE = 400, 1e-2
+STEPS, RATE = 350, 1e-2
 
 
 @dataclass(frozen=True)

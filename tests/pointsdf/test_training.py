@@ -144,6 +144,10 @@ def test_settled_statistics_answer_as_the_training_did(place, tmp_path):
     rows = np.arange(8)
     for number in range(3):
         work.step(place.examples, rows, number)
+    lagging = evaluate(work.network, place.examples, 8, "cpu")["validation_loss"]
     work.settle(place.examples, [rows])
     settled = evaluate(work.network, place.examples, 8, "cpu")["validation_loss"]
-    assert settled == pytest.approx(work.step(place.examples, rows, 3), rel=1e-4)
+    trained = work.step(place.examples, rows, 3)
+    # A cloud's middle is 0 up to half precision, and is moved there when it is drawn.
+    assert settled == pytest.approx(trained, rel=0.01)
+    assert abs(settled - trained) < 0.2 * abs(lagging - trained)
