@@ -12,7 +12,7 @@ from eight_objects import NETWORK, write_scenes
 from brrp_cli.evaluation.scenes import Scene
 from brrp_cli.pointsdf.examples import Examples, Recipe, scene_examples
 
-STEPS, RATE = 500, 2e-3
+STEPS, RATE = 350, 1e-2
 
 
 @dataclass(frozen=True)
@@ -54,6 +54,8 @@ def learnt(place) -> Place:
     training = Training(NETWORK, config, place.folder, place.weights, about)
     eight = np.arange(8)
     for number in range(STEPS):
+        # Falling to 0, so that few steps suffice.
+        training.optimizer.param_groups[0]["lr"] = RATE * (1 - number / STEPS)
         training.step(place.examples, eight, number)
     training.settle(place.examples, [eight] * 16)
     save_weights(training.network, about, place.weights, half=True)
