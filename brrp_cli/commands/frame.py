@@ -88,7 +88,7 @@ def command(
         from brrp_cli.frames.picture import write_picture
         from brrp_cli.frames.segment import segment as find_objects
 
-        frame = replace(frame, segmap=find_objects(frame, seed))
+        frame = require_objects(replace(frame, segmap=find_objects(frame, seed)))
         write_picture(frame, picture)
     elif not frame.object_ids and masks is None and source is None:
         raise FrameError(

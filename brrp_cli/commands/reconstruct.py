@@ -109,16 +109,16 @@ def command(
       brrp reconstruct frame.npz
       brrp reconstruct frame.npz --prior prior/ --preset paper -o out/ --seed 1
       brrp reconstruct frame.npz --method vprism
-      brrp reconstruct frame.npz --collision coacd --confidence 0.95
       brrp reconstruct frame.npz --method pointsdf --weights prior.safetensors
+      brrp reconstruct frame.npz --collision coacd --confidence 0.95
     """
     from brrp_cli.api import reconstruct
     from brrp_cli.frames.readers import read_frame
     from brrp_cli.surface.results import check_output, write_results
     from brrp_cli.surface.stored import open_result
 
-    check_collision(collision, confidence)
     check_weights([method], [] if weights is None else [weights])
+    check_collision(collision, confidence)
     uses_prior = METHODS[method].uses_prior
     if not uses_prior:
         refuse_options(method, device)

@@ -61,7 +61,7 @@ def scene_mjcf(bodies: Mapping[str, Body], files: Mapping[str, Files], table: Ta
     gravity = np.zeros(3) if table is None else -GRAVITY * table.up
     model, assets, world = _model("scene", gravity)
     if table is not None:
-        place = ET.SubElement(world, "body", name="table", **_pose(table.T_frame_table))
+        place = ET.SubElement(world, "body", {"name": "table", **_pose(table.T_frame_table)})
         half = spell(table.size / 2)
         ET.SubElement(place, "geom", name="table", type="box", size=half, rgba="0.7 0.66 0.6 1")
     for name, body in bodies.items():
@@ -88,7 +88,7 @@ def _add_body(
     assets: ET.Element, world: ET.Element, body: Body, files: Files, T: NDArray[np.float64]
 ) -> None:
     """Collision parts are hulls already, so that MuJoCo's own hulls change nothing."""
-    element = ET.SubElement(world, "body", name=body.name, **_pose(T))
+    element = ET.SubElement(world, "body", {"name": body.name, **_pose(T)})
     ET.SubElement(element, "freejoint", name=f"{body.name}_free")
     (xx, xy, xz), (_, yy, yz), (_, _, zz) = body.inertia
     inertia = spell([xx, yy, zz, xy, xz, yz])

@@ -8,7 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brrp_cli.config import SurfaceConfig
+from brrp_cli.finite import check_finite
 from brrp_cli.methods.base import Axes, OccupancyPosterior, Surface
+
+# How far, at least, the occupancy of what is inside lies above the level: 10 micrometres.
+_CLEAR = 1e-3
 
 
 def lattice_axes(bounds: NDArray[np.floating], spacing: float) -> Axes:
@@ -24,18 +28,18 @@ def extract_surface(
 
     observed : (n, 3) points of the object, metres, camera frame. Parts of the level set that no
     observed point is near are dropped: where neither rays nor prior samples reach, the map keeps
-    the noise that the particles started from. Returns None when nothing is left.
+    the noise that the particles started from. Returns None when nothing is left. Errors: BrrpError
+    if the posterior is not finite.
     """
     axes = lattice_axes(posterior.bounds, config.spacing)
-    found = level_set(posterior.probability_volume(axes), axes, observed, config.level, config)
+    volume = posterior.probability_volume(axes)
+    check_finite("The posterior", occupancy=volume)
+    found = level_set(volume, axes, observed, config.level, config)
     if found is None:
         return None
-    return Surface(
-        found.vertices,
-        found.faces,
-        posterior.surface_uncertainty(found.vertices),
-        posterior.surface_unit,
-    )
+    uncertainty = posterior.surface_uncertainty(found.vertices)
+    check_finite("The surface", vertices=found.vertices, uncertainty=uncertainty)
+    return Surface(found.vertices, found.faces, uncertainty, posterior.surface_unit)
 
 
 class LevelSet(NamedTuple):
@@ -63,6 +67,8 @@ def level_set(
         return None
     # What was dropped must not leave a surface; a border of zeros closes what touches the bounds.
     volume = np.where((volume >= level) & ~kept, 0.0, volume)
+    # A node on the level itself is a surface without volume, or none at all.
+    volume = np.where(kept, np.maximum(volume, level + _CLEAR), volume)
     volume = np.pad(volume, 1)
     vertices, faces, _, _ = marching_cubes(volume, level, gradient_direction="ascent")
     vertices = (vertices.astype(np.float64) - 1) * config.spacing + origin

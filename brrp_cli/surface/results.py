@@ -31,6 +31,8 @@ SCHEMA = 1
 RECORD = "result.json"
 FRAME = "frame.npz"
 POSTERIOR = "posterior.h5"
+# Metres; vertices are single precision, which has steps of a tenth of a millimetre there.
+FARTHEST_ORIGIN = 1000.0
 LIBRARIES = ("torch", "open3d", "numpy", "scipy", "scikit-image", "trimesh", "h5py", "onnxruntime")
 
 
@@ -57,7 +59,7 @@ def write_results(
         posteriors = {o.object_id: o.posterior for o in result.objects if o.posterior is not None}
         save_posteriors(posteriors, partial / POSTERIOR)
         save_frame(result.frame, partial / FRAME)
-        record = json.dumps(result_record(result, frame), indent=2) + "\n"
+        record = json.dumps(result_record(result, frame), indent=2, allow_nan=False) + "\n"
         (partial / RECORD).write_text(record)
         caption = (
             f"retrieved by {result.retriever}" if result.retriever else f"{result.method}, no prior"
@@ -91,6 +93,15 @@ def T_frame_cam(seen: Frame, frame: str) -> NDArray[np.float64]:
             where=seen.source,
             expected="the key T_world_cam, (4, 4)",
             fix="add it to the frame, or ask for --frame camera",
+        )
+    distance = float(np.linalg.norm(seen.T_world_cam[:3, 3]))
+    if distance > FARTHEST_ORIGIN:
+        raise OutputError(
+            "The world's origin is too far away for meshes in single precision",
+            where=seen.source,
+            expected=f"at most {FARTHEST_ORIGIN:g} m from the camera",
+            found=f"{distance:g} m",
+            fix="ask for --frame camera, or give T_world_cam with a nearer origin",
         )
     return seen.T_world_cam
 

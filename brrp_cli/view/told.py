@@ -79,5 +79,8 @@ def scene_points(stored: StoredResult) -> NDArray[np.float64]:
         frame = stored.frame
         seen = [frame.object_points(i) for i in frame.object_ids]
         seen = [points for points in seen if len(points)] or [np.array([[0.0, 0.0, 1.0]])]
-        vertices = [transform_points(stored.T_frame_cam, points) for points in seen]
+        vertices = [
+            np.asarray(transform_points(stored.T_frame_cam, points), dtype=np.float64)
+            for points in seen
+        ]
     return np.vstack(vertices)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 from pathlib import Path
 
 import h5py
@@ -175,9 +176,10 @@ def test_the_scene_holds_all_meshes(out):
 def test_the_posterior_can_be_asked_again(out):
     mesh = trimesh.load_mesh(out[0] / "object_250.ply", process=False)
     posterior = open_posterior(out[0] / "posterior.h5")[CAN]
-    on_surface = posterior.probability(mesh.vertices)
     # Between two nodes 5 mm apart marching cubes draws a straight line.
-    assert np.abs(on_surface - 0.5).mean() < 0.05
+    level, step = preset("default").surface.level, 0.005 * mesh.vertex_normals
+    assert (posterior.probability(mesh.vertices - step) > level).mean() > 0.95
+    assert (posterior.probability(mesh.vertices + step) < level).mean() > 0.95
     far = mesh.bounds.mean(axis=0) + [0, 0, 0.19]
     assert posterior.probability(far[None])[0] < 0.5
 
@@ -299,6 +301,18 @@ def test_another_configuration_than_the_priors_is_refused(frame_file, prior):
     config = Config(features=FeatureConfig(voxel=0.005))
     with pytest.raises(PriorError, match=r"voxel: 0.01 -> 0.005"):
         reconstruct(load_frame(frame_file), open_prior(prior), config=config)
+
+
+def test_a_damaged_shard_is_never_used(frame_file, prior, tmp_path):
+    damaged = Path(shutil.copytree(prior, tmp_path / "prior"))
+    for shard in (damaged / "shards").iterdir():
+        data = bytearray(shard.read_bytes())
+        data[len(data) // 2] ^= 1
+        shard.write_bytes(data)
+    code, output = run(frame_file, "--prior", damaged, "-o", tmp_path / "out")
+    assert code == 1
+    assert output.count("A shard is damaged") == 1 and "brrp build-prior" in output
+    assert not (tmp_path / "out").exists()
 
 
 def test_the_posterior_file_of_another_schema_is_refused(out, tmp_path):
