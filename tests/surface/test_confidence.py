@@ -156,3 +156,11 @@ def test_a_margin_grows_it_but_not_into_space_that_was_seen_to_be_empty():
     mesh = trimesh.Trimesh(grown.vertices, grown.faces, process=False)
     assert mesh.is_watertight and mesh.volume > 0
     assert grown.level == plain.level and grown.bounded
+
+
+def test_it_is_never_smaller_than_the_mesh():
+    """A method whose surface lies at 0.3 is sure of it before it is sure of 0.4."""
+    config = SurfaceConfig(level=0.3, spacing=0.003)
+    posterior = posterior_on([ball()], box(0.05))
+    found = confidence_surface(posterior, CENTER[None] + [0.03, 0, 0], 0.6, config)
+    assert found.level == 0.3

@@ -98,7 +98,7 @@ def test_a_mesh_that_is_cut_is_told(tmp_path):
 
 def colourful(picture: np.ndarray) -> np.ndarray:
     """Pixels of the drawing (right of the list, above the scale) that are not grey."""
-    drawing = picture[60:640, 380:].astype(int)
+    drawing = picture[60:640, 410:].astype(int)
     return np.ptp(drawing, axis=2) > 40
 
 
@@ -133,7 +133,7 @@ def test_a_browser_draws_it_turns_objects_off_and_asks_for_nothing(page):
         assert (tab.screenshot() != behind).any(axis=2).mean() > 0.01
         tab.click("#show-table")
         tab.click("#none")
-        empty = tab.screenshot()[60:640, 380:]
+        empty = tab.screenshot()[60:640, 410:]
         assert (empty == empty[0, 0]).all(), "nothing is left"
 
         assert tab.errors == []
