@@ -8,11 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brrp_cli.config import SurfaceConfig
+from brrp_cli.errors import BrrpError
 from brrp_cli.finite import check_finite
 from brrp_cli.methods.base import Axes, OccupancyPosterior, Surface
 
 # How far, at least, the occupancy of what is inside lies above the level: 10 micrometres.
 _CLEAR = 1e-3
+MAX_NODES = 2**24
 
 
 def lattice_axes(bounds: NDArray[np.floating], spacing: float) -> Axes:
@@ -29,8 +31,9 @@ def extract_surface(
     observed : (n, 3) points of the object, metres, camera frame. Parts of the level set that no
     observed point is near are dropped: where neither rays nor prior samples reach, the map keeps
     the noise that the particles started from. Returns None when nothing is left. Errors: BrrpError
-    if the posterior is not finite.
+    if the posterior is not finite, or wider than any object.
     """
+    _check_size(posterior.bounds, config.spacing)
     axes = lattice_axes(posterior.bounds, config.spacing)
     volume = posterior.probability_volume(axes)
     check_finite("The posterior", occupancy=volume)
@@ -73,6 +76,19 @@ def level_set(
     vertices, faces, _, _ = marching_cubes(volume, level, gradient_direction="ascent")
     vertices = (vertices.astype(np.float64) - 1) * config.spacing + origin
     return LevelSet(vertices, faces.astype(np.int64))
+
+
+def _check_size(bounds: NDArray[np.floating], spacing: float) -> None:
+    """BrrpError where a lattice would hold more nodes than memory: one stray pixel of a mask on a
+    far wall makes an object metres wide."""
+    size = np.asarray(bounds[1] - bounds[0], dtype=np.float64)
+    if not np.prod(size / spacing + 1) <= MAX_NODES:
+        raise BrrpError(
+            "The object is too wide for a surface",
+            expected=f"up to about {MAX_NODES ** (1 / 3) * spacing:.1f} m in each direction",
+            found=" x ".join(f"{side:.2f}" for side in size) + " m",
+            fix="take pixels of what lies behind it out of its mask",
+        )
 
 
 def _near_observed(

@@ -39,36 +39,34 @@ def seen() -> Frame:
     return photograph({BOX: mesh})
 
 
-def with_mask(seen: Frame, rows, columns, depth=None, extra_id: int = 2) -> Frame:
+def with_mask(seen: Frame, region, depth=None) -> Frame:
     """The same with one more object where the table is; `depth` replaces what was measured."""
     mask, z = seen.segmap.copy(), seen.points[..., 2].copy()
-    mask[rows, columns] = extra_id
+    mask[region] = 2
     if depth is not None:
-        z[rows, columns] = depth
+        z[region] = depth
     return make_frame(seen.rgb, mask, depth=z, K=K, T_world_cam=seen.T_world_cam)
 
 
 ROWS, COLUMNS = np.mgrid[: SHAPE[0], : SHAPE[1]]
 CHECKS = (ROWS + COLUMNS) % 2 == 0
+PATCH = np.s_[190:215, 30:70]
+BORDER = (ROWS < 3) | (ROWS > 236) | (COLUMNS < 3) | (COLUMNS > 316)
 
 CASES = {
-    "one pixel": lambda s: with_mask(s, 200, 40),
-    "a line": lambda s: with_mask(s, 210, slice(20, 60)),
-    "flat on the table": lambda s: with_mask(s, slice(190, 215), slice(30, 70)),
-    "no depth at all": lambda s: with_mask(s, slice(190, 215), slice(30, 70), np.nan),
+    "one pixel": lambda s: with_mask(s, np.s_[200:201, 40:41]),
+    "a line": lambda s: with_mask(s, np.s_[210, 20:60]),
+    "flat on the table": lambda s: with_mask(s, PATCH),
+    "no depth at all": lambda s: with_mask(s, PATCH, np.nan),
     "every other pixel without depth": lambda s: with_mask(
-        s, CHECKS & (ROWS > 190) & (ROWS < 215) & (COLUMNS < 70), slice(None), None
+        s, PATCH, np.where(CHECKS, s.points[..., 2], np.nan)[PATCH]
     ),
-    "at the image's border": lambda s: with_mask(s, slice(200, None), slice(0, 40), 0.5),
-    "all of the border": lambda s: with_mask(
-        s, (ROWS < 3) | (ROWS > 236) | (COLUMNS < 3) | (COLUMNS > 316), slice(None)
-    ),
-    "points on one ray": lambda s: with_mask(s, slice(200, 204), slice(40, 44), 0.4),
-    "a few stray depths of 90 m": lambda s: with_mask(
-        s, slice(190, 215), slice(30, 70), np.where(CHECKS[190:215, 30:70], 0.5, 90.0)
-    ),
-    "right before the camera": lambda s: with_mask(s, slice(180, 230), slice(30, 90), 0.02),
-    "the whole table": lambda s: with_mask(s, s.segmap == 0, slice(None)),
+    "at the image's border": lambda s: with_mask(s, np.s_[200:, :40], 0.5),
+    "all of the border": lambda s: with_mask(s, BORDER & (s.segmap == 0)),
+    "points on one ray": lambda s: with_mask(s, np.s_[200:204, 40:44], 0.4),
+    "a few stray depths of 90 m": lambda s: with_mask(s, PATCH, np.where(CHECKS[PATCH], 0.5, 90.0)),
+    "right before the camera": lambda s: with_mask(s, np.s_[180:230, 30:90], 0.02),
+    "the whole table": lambda s: with_mask(s, s.segmap == 0),
 }
 
 
@@ -83,7 +81,7 @@ def sane(result: Reconstruction) -> None:
         mesh = item.surface.as_trimesh()
         assert np.isfinite(mesh.vertices).all() and np.isfinite(item.surface.uncertainty).all()
         assert mesh.is_watertight and mesh.is_winding_consistent and mesh.volume > 0
-        assert mesh.extents.max() < 1.0
+        assert mesh.extents.max() < 3.0
         assert np.linalg.norm(mesh.bounds.mean(axis=0)) < 60
 
 

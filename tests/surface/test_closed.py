@@ -78,3 +78,15 @@ def test_an_occupancy_that_is_no_number_never_becomes_a_mesh(bad: float) -> None
     values[0, 0, 0] = bad
     with pytest.raises(BrrpError, match="posterior gave numbers that are NaN"):
         extract_surface(Lattice(values), OBSERVED, SurfaceConfig())
+
+
+def test_an_object_wider_than_memory_is_refused_before_it_is_asked() -> None:
+    class Wide(Lattice):
+        bounds = np.array([[-40.0, -28, 0], [0, 0, 90]])
+
+        def probability_volume(self, axes) -> np.ndarray:
+            raise AssertionError("it was asked")
+
+    with pytest.raises(BrrpError, match="too wide for a surface") as caught:
+        extract_surface(Wide(np.zeros(1)), OBSERVED, SurfaceConfig())
+    assert "40.00 x 28.00 x 90.00 m" in str(caught.value)
