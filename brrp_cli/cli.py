@@ -17,8 +17,9 @@ COMMANDS = {
     "info": ("info", "Show what a prior holds and how it was made."),
     "verify": ("verify", "Check every byte of a prior."),
     "frame": ("frame", "Turn colour and depth images into a frame; find the objects."),
-    "reconstruct": ("reconstruct", "Turn a segmented RGBD frame into a closed mesh per object."),
-    "fetch": ("fetch", "Bring CLIP, which retrieves objects by their look."),
+    "segment": ("segment", "Make masks, show them, and correct them by id."),
+    "reconstruct": ("reconstruct", "Turn an RGBD frame into a closed mesh per object."),
+    "fetch": ("fetch", "Bring CLIP, or the models that make masks by a prompt."),
     "eval": ("eval", "Measure methods on scenes whose truth is known."),
     "demo": ("demo", "Run the whole path on a made scene and score it."),
 }

@@ -81,6 +81,10 @@ class RetrievalError(BrrpError):
     """Retrieval cannot run: a model is missing or not the right one."""
 
 
+class MaskError(BrrpError):
+    """Masks cannot be made: a model is missing or not the right one."""
+
+
 class FetchError(BrrpError):
     """A file cannot be fetched, or what came is not the file that was meant."""
 

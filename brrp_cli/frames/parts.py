@@ -43,6 +43,24 @@ def join_parts(
     return relabel(parts, (length >= neck) & (border < threshold * length))
 
 
+def split_at_strongest(
+    parts: NDArray[np.int64], boundary: NDArray[np.float64], pieces: int
+) -> NDArray[np.int64]:
+    """Labels (H, W) of that many parts, or of fewer where there are no more: neighbours are joined,
+    the weakest border first, and then the smallest with whatever is nearest in number."""
+    while (count := len(np.unique(parts[parts > 0]))) > pieces:
+        border, length = _borders(parts, boundary)
+        if length.any():
+            mean = np.where(length > 0, border / np.maximum(length, 1), np.inf)
+            first, second = (int(i) for i in np.unravel_index(np.argmin(mean), mean.shape))
+        else:
+            labels, sizes = np.unique(parts[parts > 0], return_counts=True)
+            first, second = (int(i) for i in labels[np.argsort(sizes, kind="stable")[[1, 0]]])
+        parts = np.where(parts == second, first, parts)
+        assert len(np.unique(parts[parts > 0])) == count - 1
+    return parts
+
+
 def contacts(parts: NDArray[np.int64], crease: NDArray[np.float64]) -> NDArray[np.bool_]:
     """(n + 1, n + 1) whether two parts meet in a hollow crease (H, W), 0 to 1."""
     border, length = _borders(parts, crease)
