@@ -16,6 +16,7 @@ _CELL = 0.003
 # Mean cosine to the middle, of an inside that has a good part of the footprint and of any: the
 # inside of a round wall has 0.7 and more.
 _INWARD, _ALL_INWARD = 0.3, 0.65
+_ROUND = 0.2
 _ABOVE = 0.02  # metres by which an inside may rise over its outside
 _SAME_RANGE = 0.3
 _STANDS = 0.04  # metres; what is nowhere lower does not stand on the table
@@ -72,19 +73,15 @@ def join_on_one_spot(
             shared = len(first.cells & second.cells) / min(len(first.cells), len(second.cells))
             pieces = shared > _PIECES and not touch[i, j] and _at_one_height(first, second)
             inward = max(_inward(first, second), _inward(second, first))
-            same[i, j] = pieces or inward > (_INWARD if shared > overlap else _ALL_INWARD)
+            inside = inward > _INWARD and shared > overlap
+            # The near wall of a mug, and the far one, which completes its round.
+            round_off = inward > _ALL_INWARD and _gap(first, second) < _ROUND
+            same[i, j] = pieces or inside or round_off
     return relabel(parts, same)
 
 
 def _standing(mask: NDArray[np.bool_], plan: Array, height: Array, normals: Array) -> Standing:
-    cells = np.unique(np.floor(plan[mask] / _CELL).astype(np.int64), axis=0)
-    hull = convex_hull(cells.astype(np.float64))
-    if hull is not None:
-        low, high = cells.min(axis=0), cells.max(axis=0)
-        box = np.stack(
-            np.meshgrid(*(np.arange(a, b + 1) for a, b in zip(low, high, strict=True))), axis=-1
-        ).reshape(-1, 2)
-        cells = box[in_hull(hull, box.astype(np.float64), 1e-9)]
+    cells = _filled(np.unique(np.floor(plan[mask] / _CELL).astype(np.int64), axis=0))
     bottom, top = np.percentile(height[mask], (5, 95))
     known = mask & np.isfinite(normals).all(axis=-1)
     return Standing(
@@ -97,10 +94,28 @@ def _standing(mask: NDArray[np.bool_], plan: Array, height: Array, normals: Arra
     )
 
 
+def _filled(cells: NDArray[np.int64]) -> NDArray[np.int64]:
+    """All cells (m, 2) in the convex hull of cells (n, 2)."""
+    hull = convex_hull(cells.astype(np.float64))
+    if hull is None:
+        return cells
+    low, high = cells.min(axis=0), cells.max(axis=0)
+    box = np.stack(
+        np.meshgrid(*(np.arange(a, b + 1) for a, b in zip(low, high, strict=True))), axis=-1
+    ).reshape(-1, 2)
+    return box[in_hull(hull, box.astype(np.float64), 1e-9)]
+
+
+def _gap(first: Standing, second: Standing) -> float:
+    """What the hull of both footprints holds beside them, as a part of them."""
+    both = np.array(sorted(first.cells | second.cells), dtype=np.int64)
+    return len(_filled(both)) / len(both) - 1.0
+
+
 def _inward(inner: Standing, outer: Standing) -> float:
     """How much the steep surface of `inner` faces the middle of both: 1 all of it, -1 away. 0 where
-    it rises above `outer` or their footprints have nothing in common."""
-    if inner.high > outer.high + _ABOVE or not (inner.cells & outer.cells):
+    it rises above `outer`."""
+    if inner.high > outer.high + _ABOVE:
         return 0.0
     both = np.array(sorted(inner.cells | outer.cells), dtype=np.float64)
     toward = (both.mean(axis=0) + 0.5) * _CELL - inner.plan

@@ -6,6 +6,8 @@ RealSense recordings (.bag of the Viewer) are ROS 1 bags, but their depth is not
 from __future__ import annotations
 
 import logging
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -71,7 +73,8 @@ def read(path: Path, request: Request) -> Frame:
     return Frame(frame.rgb, frame.points, frame.segmap, frame.K, source=path)
 
 
-def _opened(path: Path) -> Any:
+@contextmanager
+def _opened(path: Path) -> Iterator[Any]:
     try:
         from rosbags.highlevel import AnyReader
         from rosbags.typesys import Stores, get_typestore
@@ -84,20 +87,22 @@ def _opened(path: Path) -> Any:
         ) from error
     # Older ROS 2 bags do not bring the definitions of their messages.
     folder = path if path.is_dir() or path.suffix == ".bag" else path.parent
+    reader: Any = None
     try:
-        return AnyReader([folder], default_typestore=get_typestore(Stores.ROS2_HUMBLE))
+        reader = AnyReader([folder], default_typestore=get_typestore(Stores.ROS2_HUMBLE))
+        reader.open()
     except Exception as error:  # the library's errors have no common base
-        raise _damaged(path, error) from error
-
-
-def _damaged(path: Path, error: Exception) -> FrameError:
-    return FrameError(
-        "The bag cannot be read",
-        where=path,
-        expected="a whole ROS 1 .bag, or a ROS 2 bag's folder with metadata.yaml",
-        found=error,
-        fix="reindex it: rosbag reindex (ROS 1), ros2 bag reindex (ROS 2)",
-    )
+        raise FrameError(
+            "The bag cannot be read",
+            where=path,
+            expected="a whole ROS 1 .bag, or a ROS 2 bag's folder with metadata.yaml",
+            found=error,
+            fix="reindex it: rosbag reindex (ROS 1), ros2 bag reindex (ROS 2)",
+        ) from error
+    try:
+        yield reader
+    finally:
+        reader.close()
 
 
 def _messages(reader: Any, topic: str) -> Any:
