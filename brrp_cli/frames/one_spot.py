@@ -16,7 +16,7 @@ _CELL = 0.003
 # Mean cosine to the middle, of an inside that has a good part of the footprint and of any: the
 # inside of a round wall has 0.7 and more.
 _INWARD, _ALL_INWARD = 0.3, 0.65
-_ROUND = 0.2
+_ROUND = 0.35
 _ABOVE = 0.02  # metres by which an inside may rise over its outside
 _SAME_RANGE = 0.3
 _STANDS = 0.04  # metres; what is nowhere lower does not stand on the table
