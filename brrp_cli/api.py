@@ -9,13 +9,14 @@ from __future__ import annotations
 
 import logging
 import time
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from brrp_cli.config import Config, VPrismConfig, preset
-from brrp_cli.errors import BrrpError, PriorError
-from brrp_cli.frames.frame import Frame
+from brrp_cli.config import Config, PointSDFConfig, VPrismConfig, preset
+from brrp_cli.errors import BrrpError, PriorError, WeightsError
+from brrp_cli.files import sha256_file
+from brrp_cli.frames.frame import BACKGROUND, Frame
 from brrp_cli.frames.observe import ObjectObservation, observe
 from brrp_cli.frames.plane import Plane
 from brrp_cli.methods.base import FAILED, NO_SURFACE, OK, TOO_FEW_POINTS, ObjectReconstruction
@@ -81,23 +82,27 @@ def reconstruct(
     method: str = "brrp",
     config: Config | None = None,
     retriever: Retriever | None = None,
+    weights: str | Path | None = None,
     seed: int = 0,
     device: str = "auto",
 ) -> Reconstruction:
     """Reconstruct every object of a segmented frame.
 
-    method : "brrp", which needs a prior, or "vprism", which has none, runs on the CPU and takes
+    method : "brrp", which needs a prior; "vprism", which has none and runs on the CPU; or
+    "pointsdf", which needs `weights`, a file that tools/train_pointsdf.py wrote. The last two take
     the surface alone from `config`
     retriever : P(c|R); without one, CLIP if `BRRP_CLIP_DIR` is set or CLIP was fetched, else
     appearance, else (with a prior of an older brrp) registration fitness. An object that cannot be
     reconstructed gets a status; the others still are. The frame is never changed. The same seed
     gives the same result.
 
-    Errors: BrrpError for an unknown method, or a prior or retriever that it lacks or cannot use;
-    PriorError for a shard that is damaged, when an object is read from it.
+    Errors: BrrpError for an unknown method, or a prior, retriever or weights that it lacks or
+    cannot use; PriorError for a shard that is damaged, when an object is read from it.
     """
-    _check_method(method, prior, retriever)
+    _check_method(method, prior, retriever, weights)
     config = config or preset("default")
+    if weights is not None:
+        return _pointsdf(frame, Path(weights), config, seed, pick_device(device))
     if prior is None:
         return _vprism(frame, config, seed)
     from brrp_cli.methods.brrp import reconstruct_object
@@ -153,8 +158,10 @@ def reconstruct(
     )
 
 
-def _check_method(method: str, prior: Prior | None, retriever: Retriever | None) -> None:
-    """BrrpError unless there is such a method and it has the prior that it needs, and no other."""
+def _check_method(
+    method: str, prior: Prior | None, retriever: Retriever | None, weights: str | Path | None
+) -> None:
+    """BrrpError unless there is such a method and it has what it needs, and nothing else."""
     if method not in RECONSTRUCTING:
         raise BrrpError("No such method", found=method, expected=", ".join(RECONSTRUCTING))
     if METHODS[method].uses_prior and prior is None:
@@ -163,6 +170,13 @@ def _check_method(method: str, prior: Prior | None, retriever: Retriever | None)
         raise BrrpError(
             f"{method} uses no prior", found="a prior or a retriever", fix="leave them out"
         )
+    if METHODS[method].uses_weights and weights is None:
+        raise WeightsError(
+            f"{method} needs trained weights",
+            fix="pass weights=FILE with a file that tools/train_pointsdf.py wrote",
+        )
+    if not METHODS[method].uses_weights and weights is not None:
+        raise BrrpError(f"{method} was not trained", found="weights", fix="leave them out")
 
 
 def _vprism(frame: Frame, config: Config, seed: int) -> Reconstruction:
@@ -175,8 +189,9 @@ def _vprism(frame: Frame, config: Config, seed: int) -> Reconstruction:
     scene = sample_scene(frame, own.observation, seed)
     seconds = {"observation": time.perf_counter() - start}
     objects = reconstruct_scene(scene, own, seed)
+    surface = replace(config.surface, level=METHODS["vprism"].level(config))
     for item in progress(objects, "surfaces"):
-        _add_surface(item, config)
+        _add_surface(item, replace(config, surface=surface))
     return Reconstruction(
         frame=frame,
         objects=objects,
@@ -185,10 +200,54 @@ def _vprism(frame: Frame, config: Config, seed: int) -> Reconstruction:
         retriever=None,
         prior_path=None,
         prior_digest=None,
-        configuration={**asdict(own), "surface": asdict(config.surface)},
+        configuration={**asdict(own), "surface": asdict(surface)},
         seed=seed,
         device="cpu",
         seconds=seconds,
+    )
+
+
+def _pointsdf(
+    frame: Frame, weights: Path, config: Config, seed: int, device: str
+) -> Reconstruction:
+    """The frame's objects by a trained network; surfaces as `config` asks for them, but at the
+    method's own level."""
+    from brrp_cli.frames.observe import box_center
+    from brrp_cli.frames.plane import fit_plane
+    from brrp_cli.methods.pointsdf import reconstruct_pointsdf
+    from brrp_cli.pointsdf.weights import load_weights
+
+    own = PointSDFConfig()
+    loaded = load_weights(weights)
+    surface = replace(config.surface, level=own.level)
+    objects = reconstruct_pointsdf(frame, loaded.network.to(device), own)
+    for item in progress(objects, "surfaces"):
+        _add_surface(item, replace(config, surface=surface))
+    # The network asks for no table; the picture does, to show the scene upright.
+    background = frame.points[frame.valid & (frame.segmap == BACKGROUND)]
+    seen = frame.points[frame.valid & (frame.segmap != BACKGROUND)]
+    return Reconstruction(
+        frame=frame,
+        objects=objects,
+        plane=fit_plane(background, config.observation, seed, box_center(seen))
+        if len(seen)
+        else None,
+        method="pointsdf",
+        retriever=None,
+        prior_path=None,
+        prior_digest=None,
+        configuration={
+            **asdict(own),
+            "surface": asdict(surface),
+            "network": asdict(loaded.network.config),
+            "weights": {
+                "path": str(weights),
+                "sha256": sha256_file(weights),
+                "training": loaded.training,
+            },
+        },
+        seed=seed,
+        device=device,
     )
 
 

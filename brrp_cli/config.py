@@ -77,9 +77,13 @@ class InferenceConfig:
 
 @dataclass(frozen=True)
 class SurfaceConfig:
-    """Marching cubes on the mean occupancy."""
+    """Marching cubes on the mean occupancy at `level`.
 
-    level: float = 0.5
+    Where half of the volume is unseen, the overlap with the truth is expected to be largest at less
+    than a half: at half of that overlap (Lipton et al., 2014, for F1).
+    """
+
+    level: float = 0.4
     spacing: float = 0.005
     # A component of the level set further than this from every observed point is hallucinated.
     keep_distance: float = 0.01
@@ -110,6 +114,7 @@ class SearchConfig:
     Starts are `matchings` feature matchings and every resting pose turned `turns` times. The best
     `coarse` of them are refined and judged, the best `fine` of those again. The best `rescaled`
     are then tried at `scales` times the true size; evidence falls by scale_cost * ln(scale)^2.
+    Of placements whose surfaces lie within `distinct` metres the best is kept, `kept` in all.
     """
 
     turns: int = 24
@@ -117,7 +122,7 @@ class SearchConfig:
     matching: RegistrationConfig = field(
         default_factory=lambda: RegistrationConfig(iterations=10_000)
     )
-    coarse: int = 24
+    coarse: int = 48
     coarse_distance: float = 0.03
     coarse_points: int = 400
     fine: int = 8
@@ -128,6 +133,7 @@ class SearchConfig:
     rescaled: int = 2
     scale_distance: float = 0.015
     scale_cost: float = 0.6
+    distinct: float = 0.0015
     kept: int = 6
     evidence: EvidenceConfig = field(default_factory=EvidenceConfig)
 
@@ -141,8 +147,8 @@ class WeighConfig:
     than `least_share`, since a retriever may be wrong.
     """
 
-    sharpness: float = 25.0
-    unknown_evidence: float = 0.65
+    sharpness: float = 40.0
+    unknown_evidence: float = 0.8
     least_unknown: float = 0.1
     most_unknown: float = 0.9
     least_share: float = 1e-3
@@ -153,20 +159,17 @@ class MeanConfig:
     """Mean functions of hypotheses, logits on a lattice of about `nodes` nodes.
 
     A placed shape is -(signed distance - growth) / width, limited to +-limit; evidence under `sure`
-    widens it by `doubt` for each unit. The shape of what was seen is -distance / visible_width,
-    between -limit and visible_limit. Space is empty that lies more than `carve_depth` in front of
+    widens it by `doubt` for each unit. Space is empty that lies more than `carve_depth` in front of
     the measured depth, or `carve_plane` below the plane, or less than `carve_behind` behind what
     is no object's and more than `carve_pixels` from the mask.
     """
 
-    nodes: int = 100_000
+    nodes: int = 200_000
     growth: float = 0.0015
     width: float = 0.002
-    sure: float = 0.85
+    sure: float = 0.9
     doubt: float = 0.02
     limit: float = 5.0
-    visible_width: float = 0.005
-    visible_limit: float = 1.0
     carve_depth: float = 0.006
     carve_plane: float = 0.004
     carve_behind: float = 0.01
@@ -174,18 +177,15 @@ class MeanConfig:
 
 
 @dataclass(frozen=True)
-class VisibleShapeConfig:
-    """The shape of an object that no stored one explains.
+class CompletionConfig:
+    """The shape of an object that no stored one explains (brrp_cli/completion).
 
-    cell : of grids in which observed points are merged; closing : gaps of fewer cells are closed
-    shrink : metres by which the hull is drawn in for each metre from an observed point; growth :
-    metres by which it is grown as a whole
+    cell : metres, of grids in which observed points are merged; closing : gaps of fewer cells are
+    closed
     """
 
     cell: float = 0.004
     closing: int = 7
-    shrink: float = 0.15
-    growth: float = 0.003
 
 
 @dataclass(frozen=True)
@@ -218,7 +218,7 @@ class HypothesesConfig:
     search: SearchConfig = field(default_factory=SearchConfig)
     weigh: WeighConfig = field(default_factory=WeighConfig)
     mean: MeanConfig = field(default_factory=MeanConfig)
-    visible: VisibleShapeConfig = field(default_factory=VisibleShapeConfig)
+    completion: CompletionConfig = field(default_factory=CompletionConfig)
     map: FittedMapConfig = field(default_factory=FittedMapConfig)
 
 
@@ -244,7 +244,10 @@ class Config:
         return asdict(self)
 
 
-PRESETS = {"paper": Config(preset="paper", hypotheses=None), "default": Config(preset="default")}
+PRESETS = {
+    "paper": Config(preset="paper", surface=SurfaceConfig(level=0.5), hypotheses=None),
+    "default": Config(preset="default"),
+}
 
 
 def preset(name: str) -> Config:
@@ -258,6 +261,19 @@ def _vprism_observation() -> ObservationConfig:
     return ObservationConfig(
         ray_bin=0.1, ray_radius=0.25, plane_radius=0.4, below_draws=1000, below_radius=0.25
     )
+
+
+@dataclass(frozen=True)
+class PointSDFConfig:
+    """The PointSDF baseline: what is asked of a trained network.
+
+    level : occupancy at the surface, the paper's; half_width : of the box around the middle of what
+    was seen outside of which occupancy is 0
+    """
+
+    level: float = 0.3
+    min_points: int = 16
+    half_width: float = 0.2
 
 
 @dataclass(frozen=True)

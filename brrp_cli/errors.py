@@ -85,6 +85,10 @@ class MaskError(BrrpError):
     """Masks cannot be made: a model is missing or not the right one."""
 
 
+class WeightsError(BrrpError):
+    """A learned method's weights are missing, damaged, or of something else."""
+
+
 class FetchError(BrrpError):
     """A file cannot be fetched, or what came is not the file that was meant."""
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -76,23 +77,38 @@ def inside(mesh: trimesh.Trimesh, points: NDArray[np.floating]) -> NDArray[np.bo
 
     Errors: MeshError for a mesh that is not closed, where the question has no answer.
     """
-    if len(mesh.faces) == 0 or not mesh.is_watertight:
-        raise MeshError(
-            "Inside and outside of an open mesh are not defined",
-            expected="a closed surface",
-            found=f"{len(mesh.faces)} faces, not closed",
-            fix="repair the mesh first",
-        )
-    low, high = mesh.bounds
-    found = ((points >= low) & (points <= high)).all(axis=-1)
-    if not found.any():
+    return Solid(mesh).inside(points)
+
+
+class Solid:
+    """A closed mesh that is asked more than once. Errors: MeshError for one that is not closed."""
+
+    def __init__(self, mesh: trimesh.Trimesh) -> None:
+        if len(mesh.faces) == 0 or not mesh.is_watertight:
+            raise MeshError(
+                "Inside and outside of an open mesh are not defined",
+                expected="a closed surface",
+                found=f"{len(mesh.faces)} faces, not closed",
+                fix="repair the mesh first",
+            )
+        self.mesh = mesh
+        self.bounds = np.asarray(mesh.bounds)
+
+    @cached_property
+    def _scene(self) -> Any:
+        # Rays are float32: far from the origin they would lose millimetres.
+        centred = self.mesh.copy()
+        centred.apply_translation(-self.bounds.mean(axis=0))
+        return raycasting_scene([centred])
+
+    def inside(self, points: NDArray[np.floating]) -> NDArray[np.bool_]:
+        """Which of `points` (n, 3), in the mesh's frame, lie inside: (n,) bool."""
+        low, high = self.bounds
+        found = ((points >= low) & (points <= high)).all(axis=-1)
+        if not found.any():
+            return np.asarray(found)
+        o3d = import_open3d()
+        near = points[found] - self.bounds.mean(axis=0)
+        query = o3d.core.Tensor(np.ascontiguousarray(near, dtype=np.float32))
+        found[found] = self._scene.compute_occupancy(query, nsamples=RAYS).numpy() > 0.5
         return np.asarray(found)
-    o3d = import_open3d()
-    # Rays are float32: far from the origin they would lose millimetres.
-    center = (low + high) / 2
-    centred = mesh.copy()
-    centred.apply_translation(-center)
-    query = o3d.core.Tensor(np.ascontiguousarray(points[found] - center, dtype=np.float32))
-    occupancy = raycasting_scene([centred]).compute_occupancy(query, nsamples=RAYS)
-    found[found] = occupancy.numpy() > 0.5
-    return np.asarray(found)

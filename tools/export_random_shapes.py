@@ -1,6 +1,7 @@
 """Export PyBullet's random shapes as closed meshes in metres, one NNN.obj each.
 
     python tools/export_random_shapes.py --count 100 -o random_shapes
+    python tools/export_random_shapes.py --first 100 --count 300 -o other_shapes
 
 The thousand shapes of pybullet_data/random_urdfs (9 to 12 cm long, made of blocks) come as convex
 parts with gaps of a fraction of a millimetre between them. Each part is grown by half a gap and
@@ -13,6 +14,7 @@ from __future__ import annotations
 
 import re
 import sys
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -32,13 +34,15 @@ GROWTH = (0.0002, 0.0004, 0.0008)  # metres on each side; the first that closes 
 
 @click.command()
 @click.option("--count", default=100, show_default=True, type=click.IntRange(1, 1000))
+@click.option("--first", default=0, show_default=True, type=click.IntRange(0, 999))
 @click.option("-o", "--output", required=True, type=click.Path(path_type=Path))
-def main(count: int, output: Path) -> None:
-    """Export the first COUNT shapes to OUTPUT."""
+def main(count: int, first: int, output: Path) -> None:
+    """Export COUNT shapes, from number FIRST on, to OUTPUT."""
     try:
         data = Path(import_library("pybullet_data").getDataPath()) / "random_urdfs"
         left_out = 0
-        for number in tqdm(range(count), desc="shapes"):
+        numbers = range(first, min(first + count, 1000))
+        for number in tqdm(numbers, desc="shapes"):
             solid = one_solid(read_parts(data / f"{number:03d}"))
             if solid is None:
                 left_out += 1
@@ -46,12 +50,14 @@ def main(count: int, output: Path) -> None:
                 write_bytes(output / f"{number:03d}.obj", solid.encode())
     except BrrpError as error:
         raise click.ClickException(str(error)) from error
-    click.echo(f"{output}: {count - left_out} shapes, {left_out} left out")
+    click.echo(f"{output}: {len(numbers) - left_out} shapes, {left_out} left out")
 
 
 def read_parts(folder: Path) -> list[Any]:
-    """The convex parts of NNN/NNN.obj as trimesh.Trimesh, scaled as NNN.urdf says."""
+    """The convex parts of NNN/NNN.obj as trimesh.Trimesh, scaled as NNN.urdf says; flat ones, which
+    enclose nothing, are left out."""
     import trimesh
+    from scipy.spatial import QhullError
 
     urdf = (folder / f"{folder.name}.urdf").read_text()
     scale = re.search(r'<mesh filename="[^"]*" scale="([^"]*)"', urdf)
@@ -60,7 +66,11 @@ def read_parts(folder: Path) -> list[Any]:
     loaded: Any = trimesh.load(folder / f"{folder.name}.obj", force="mesh", skip_materials=True)
     mesh = trimesh.Trimesh(loaded.vertices, loaded.faces)
     mesh.apply_scale([float(factor) for factor in scale[1].split()])
-    return [part.convex_hull for part in mesh.split(only_watertight=False)]
+    parts = []
+    for part in mesh.split(only_watertight=False):
+        with suppress(QhullError):
+            parts.append(part.convex_hull)
+    return parts
 
 
 def one_solid(parts: list[Any]) -> str | None:
@@ -79,7 +89,10 @@ def one_solid(parts: list[Any]) -> str | None:
         ]
         union = manifold3d.Manifold.batch_boolean(grown, manifold3d.OpType.Add)
         # Slivers thinner than the gaps would fall shut when the file rounds its numbers.
-        mesh = union.simplify(growth).to_mesh64()
+        simplified = union.simplify(growth)
+        if simplified.is_empty():
+            continue
+        mesh = simplified.to_mesh64()
         text = str(trimesh.Trimesh(mesh.vert_properties, mesh.tri_verts).export(file_type="obj"))
         written: Any = trimesh.load(
             trimesh.util.wrap_as_stream(text), file_type="obj", force="mesh"

@@ -10,6 +10,7 @@ from typing import Any
 import click
 
 from brrp_cli.commands.retriever_option import RetrieverName
+from brrp_cli.commands.weights_option import check_weights
 from brrp_cli.config import PRESETS
 from brrp_cli.methods.registry import METHODS
 from brrp_cli.progress import note
@@ -58,6 +59,12 @@ def _selection(ctx: click.Context, option: click.Parameter, value: str | None) -
     default=["brrp,vprism"],
     callback=_several(click.Choice(list(METHODS))),
     help=f"Of {', '.join(METHODS)}. [default: brrp,vprism]",
+)
+@click.option(
+    "--weights",
+    multiple=True,
+    callback=_several(click.Path(path_type=Path)),
+    help="What pointsdf was trained to: files of tools/train_pointsdf.py, by name in the tables.",
 )
 @click.option(
     "--preset",
@@ -109,6 +116,7 @@ def command(
     output: Path | None,
     data_root: Path | None,
     methods: list[str],
+    weights: list[Path],
     presets: list[str],
     ks: list[int],
     retrievers: list[str],
@@ -133,11 +141,13 @@ def command(
       brrp eval scenes/ --prior prior/ --data-root data/
       brrp eval scenes/ --method brrp --k 1,3,5,10 -o ablation/
       brrp eval scenes/ --preset paper,default --shift-masks 0,2 --scenes 0:20
+      brrp eval scenes/ --method vprism,pointsdf --weights prior.safetensors,other.safetensors
 
     Exit codes: 0 all objects have a result, 3 some failed.
     """
     from brrp_cli.evaluation.evaluate import Request, evaluate
 
+    check_weights(methods, weights)
     request = Request(
         scenes=scenes,
         output=output or scenes.parent / f"{scenes.resolve().name}_eval",
@@ -148,6 +158,7 @@ def command(
         retrievers=retrievers,
         shifts=shifts,
         prior=prior_path,
+        weights=weights,
         clip_dir=clip_dir,
         noise=noise,
         selection=selection,

@@ -13,6 +13,7 @@ from click.core import ParameterSource
 from brrp_cli.commands.frame import refuse_existing
 from brrp_cli.commands.retriever_option import RetrieverName
 from brrp_cli.commands.source_options import SourceOptions, source_options
+from brrp_cli.commands.weights_option import check_weights
 from brrp_cli.config import PRESETS, preset
 from brrp_cli.methods.registry import METHODS, RECONSTRUCTING
 from brrp_cli.progress import note
@@ -40,7 +41,12 @@ OF_A_PRIOR = ("prior_path", "preset_name", "k", "retriever", "clip_dir")
     type=click.Choice(list(RECONSTRUCTING)),
     default="brrp",
     show_default=True,
-    help="vprism: one map of the whole frame, without a prior.",
+    help="vprism: one map of the whole frame, without a prior. pointsdf: a trained network.",
+)
+@click.option(
+    "--weights",
+    type=click.Path(path_type=Path),
+    help="What pointsdf was trained to: a file of tools/train_pointsdf.py.",
 )
 @click.option("--preset", "preset_name", type=click.Choice(list(PRESETS)), default="default")
 @click.option("--k", type=click.IntRange(min=1), help="Retrieved objects. [default: the preset's]")
@@ -65,6 +71,7 @@ def command(
     prior_path: Path | None,
     output: Path | None,
     method: str,
+    weights: Path | None,
     preset_name: str,
     k: int | None,
     retriever: str,
@@ -81,8 +88,8 @@ def command(
     written beside the output, to look at and to correct with `brrp segment`.
 
     The prior is --prior, else BRRP_PRIOR, else the one in the user's data folder, else the
-    starter prior; --method vprism has none. Meshes are in metres, in the camera frame unless
-    --frame world is given.
+    starter prior; --method vprism and pointsdf have none. Meshes are in metres, in the camera frame
+    unless --frame world is given.
 
     \b
     Example:
@@ -90,11 +97,13 @@ def command(
       brrp reconstruct --color c.png --depth d.png --intrinsics k.json
       brrp reconstruct frame.npz --prior prior/ --preset paper -o out/ --seed 1
       brrp reconstruct frame.npz --method vprism
+      brrp reconstruct frame.npz --method pointsdf --weights prior.safetensors
     """
     from brrp_cli.api import reconstruct
     from brrp_cli.surface.results import check_output, write_results
 
     source.check()
+    check_weights([method], [] if weights is None else [weights])
     uses_prior = METHODS[method].uses_prior
     if not uses_prior:
         refuse_options(method, device)
@@ -110,9 +119,17 @@ def command(
     if uses_prior:
         prior, chosen = open_retrieval(prior_path, config, retriever, clip_dir, seed)
     else:
-        note(f"Method: {method}, without a prior")
+        trained = "" if weights is None else f", weights {weights}"
+        note(f"Method: {method}, without a prior{trained}")
     result = reconstruct(
-        frame, prior, method=method, config=config, retriever=chosen, seed=seed, device=device
+        frame,
+        prior,
+        method=method,
+        config=config,
+        retriever=chosen,
+        weights=weights,
+        seed=seed,
+        device=device,
     )
     write_results(result, output, frame=coordinates, overwrite=overwrite)
     report(result)
@@ -158,7 +175,7 @@ def refuse_options(method: str, device: str) -> None:
     ]
     if typed:
         raise click.UsageError(f"--method {method} has no prior, so leave out {', '.join(typed)}")
-    if device == "cuda":
+    if device == "cuda" and not METHODS[method].uses_cuda:
         raise click.UsageError(f"--method {method} runs on the CPU alone")
 
 

@@ -7,10 +7,11 @@ import os
 import platform
 import sys
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from brrp_cli.errors import WeightsError
 from brrp_cli.evaluation.bootstrap import ROUNDS
 from brrp_cli.evaluation.folder import PARAMETERS, ROWS, claimed
 from brrp_cli.evaluation.plan import Plan
@@ -30,6 +31,7 @@ from brrp_cli.evaluation.variants import Variant, expand, same_results, short_la
 from brrp_cli.files import sha256_file, write_bytes
 from brrp_cli.methods.check_prior import check_prior
 from brrp_cli.methods.registry import METHODS
+from brrp_cli.pointsdf.weights import describe_weights
 from brrp_cli.prior.store import Prior
 from brrp_cli.progress import progress
 from brrp_cli.retrieval.choose import USE_APPEARANCE, USE_CLIP, resolve_name
@@ -50,6 +52,7 @@ class Request:
     shifts: list[int]
     data_root: Path | None = None
     prior: Path | None = None
+    weights: list[Path] = field(default_factory=list)
     clip_dir: Path | None = None
     noise: bool = False
     selection: slice | None = None
@@ -73,18 +76,20 @@ class Result:
 def evaluate(request: Request, say: Callable[[str], None] = lambda text: None) -> Result:
     """Run what was not run yet and write the report.
 
-    Errors: SceneError, PriorError, RetrievalError or MeshError before the work starts; OutputError
-    if the folder holds a different run and `overwrite` is false.
+    Errors: SceneError, PriorError, RetrievalError, WeightsError or MeshError before the work
+    starts; OutputError if the folder holds a different run and `overwrite` is false.
     """
     scenes = find_scenes(request.scenes, request.selection)
     opened = _prior(request)
     prior = None if opened is None else {"path": str(opened.path), "digest": opened.digest}
+    weights = named_weights(request.weights)
     variants = expand(
         request.methods,
         request.presets,
         request.ks,
         [resolve_name(name, request.clip_dir, opened) for name in request.retrievers],
         request.shifts,
+        list(weights),
     )
     _check_prior(opened, variants)
     if any(variant.retriever in USE_CLIP for variant in variants):
@@ -103,6 +108,7 @@ def evaluate(request: Request, say: Callable[[str], None] = lambda text: None) -
         seed=request.seed,
         device=request.device,
         pictures=request.output / "pictures" if request.pictures else None,
+        weights=weights,
     )
     with claimed(request.output, parameters, overwrite=request.overwrite) as path:
         say(f"{len(scenes)} scenes, {workers} workers: {', '.join(labels.values())}")
@@ -119,6 +125,7 @@ def evaluate(request: Request, say: Callable[[str], None] = lambda text: None) -
         about = {
             **parameters,
             "prior": prior,
+            "trained": {name: describe_weights(path) for name, path in weights.items()},
             "command": " ".join(["brrp", *sys.argv[1:]]),
             "machine": machine(),
             "bootstrap_rounds": ROUNDS,
@@ -131,6 +138,25 @@ def evaluate(request: Request, say: Callable[[str], None] = lambda text: None) -
         }
         summaries, files = _write(request.output, rows, variants, labels, about, request.seed)
     return Result(summaries, labels, lost, files)
+
+
+def named_weights(paths: Sequence[Path]) -> dict[str, Path]:
+    """Weights by the names of their files, which stand for them in tables.
+
+    Errors: WeightsError for a file that cannot be used, or for two of one name.
+    """
+    found: dict[str, Path] = {}
+    for path in paths:
+        describe_weights(path)
+        if path.stem in found:
+            raise WeightsError(
+                "Two files of weights have one name",
+                where=path,
+                found=found[path.stem],
+                fix="rename one: the name tells them apart in the tables",
+            )
+        found[path.stem] = path
+    return found
 
 
 def find_data_root(scenes: Sequence[Scene], folder: Path) -> Path:
@@ -215,10 +241,17 @@ def _parameters(
         "prior_digest": None if prior is None else prior["digest"],
         "clip": str(clip) if uses_clip else None,
         "tables": {file: sha256_file(Path(file)) for file in sorted(files)},
+        **_weights_digests(request),
         "noise": request.noise,
         "seed": request.seed,
         "variants": {variant.label: variant.configuration for variant in variants},
     }
+
+
+def _weights_digests(request: Request) -> dict[str, Any]:
+    """Nothing where there are none, so that runs without weights stay what they were."""
+    digests = {path.stem: sha256_file(path) for path in request.weights}
+    return {"weights": digests} if digests else {}
 
 
 def _write(

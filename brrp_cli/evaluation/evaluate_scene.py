@@ -83,7 +83,8 @@ def _reconstruct(
     memory: dict[str, RememberingRetriever],
 ) -> tuple[dict[int, ObjectReconstruction] | BrrpError, float]:
     """What the method found, by id, and the peak of memory in MB."""
-    setup = Setup(variant.config, plan.seed, plan.device)
+    weights = None if variant.weights is None else plan.weights[variant.weights]
+    setup = Setup(variant.config, plan.seed, plan.device, weights=weights)
     reset_peak()
     try:
         if METHODS[variant.method].uses_prior:
@@ -164,7 +165,8 @@ def _row(
     if item.posterior is not None:
         rng = child_rng(plan.seed, "score", scene.name, object_id)
         scores, diagrams = score_probabilities(item.posterior, truth)
-        row |= {**score_shape(item.posterior, truth, rng), **scores, "diagrams": diagrams}
+        level = METHODS[variant.method].level(variant.config)
+        row |= {**score_shape(item.posterior, truth, rng, level), **scores, "diagrams": diagrams}
     placed = [r for r in item.retrieved if r.T_cam_object is not None]
     if placed and plan.prior is not None:
         row["placement_error"] = placement_error(

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from brrp_cli.evaluation.rows import OBJECT, Row, variant_columns
@@ -26,6 +27,7 @@ class Plan:
     seed: int = 0
     device: str = "cpu"
     pictures: Path | None = None
+    weights: Mapping[str, Path] = field(default_factory=dict)
 
 
 def lost_row(scene: str, view: int, variant: Variant, message: str) -> Row:

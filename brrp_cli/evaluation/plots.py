@@ -80,7 +80,7 @@ def shifted_bars(summaries: Sequence[VariantSummary]) -> Any | None:
     groups: dict[Variant, dict[int, Interval]] = {}
     for summary in summaries:
         v = summary.variant
-        key = Variant(v.method, v.preset, v.k, v.retriever)
+        key = Variant(v.method, v.preset, v.k, v.retriever, weights=v.weights)
         groups.setdefault(key, {})[v.shift] = summary.figures["iou"]
     groups = {key: found for key, found in groups.items() if len(found) > 1}
     if not groups:

@@ -84,7 +84,7 @@ def write_report(
         _figures_table(summaries, labels, EXACT),
     ]
     if found:
-        parts += ["## With the prior, less without", _difference_table(found, labels)]
+        parts += ["## What knowledge of objects adds", _difference_table(found, labels)]
     for region, title in (("near", "all points near the objects"), ("occluded", "occluded points")):
         columns = [(head, name.format(region), f, d) for head, name, f, d in PROBABILITIES]
         parts += [f"## Probabilities, {title}", _figures_table(summaries, labels, columns)]
@@ -193,12 +193,25 @@ def _facts(record: Mapping[str, Any]) -> str:
         f"- prior: `{record['prior']['path']}`, digest {record['prior']['digest'][:12]}"
         if record["prior"]
         else "- prior: none",
+        *(trained_line(name, found) for name, found in record["trained"].items()),
         f"- seed {record['seed']}; depth {'with sensor noise' if record['noise'] else 'as it is'}",
         f"- command: `{record['command']}`",
         f"- machine: {record['machine']}",
     ]
     lines += [f"- lost: scene {name}: {why}" for name, why in record["lost"].items()]
     return "\n".join(lines)
+
+
+def trained_line(name: str, training: Mapping[str, Any]) -> str:
+    """What stands in the report of weights: on what, and how long."""
+    epochs = training.get("config", {}).get("epochs")
+    loss = training.get("validation_loss", math.nan)
+    return (
+        f"- weights `{name}`: trained on {training.get('objects')} views of objects in "
+        f"{training.get('scenes')} scenes of {len(training.get('meshes', []))} meshes, "
+        f"epoch {training.get('epoch')} of {epochs}; labels of the {training.get('truth')} mesh; "
+        f"validation loss {loss:.4f}"
+    )
 
 
 def _same(record: Mapping[str, Any]) -> str:

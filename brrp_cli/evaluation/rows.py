@@ -23,7 +23,7 @@ from brrp_cli.files import cannot_write, write_bytes
 
 Row = dict[str, Any]
 
-VARIANT = ("method", "preset", "k", "retriever", "shift")
+VARIANT = ("method", "preset", "k", "retriever", "shift", "weights")
 OBJECT = ("scene", "view", "object_id", "name", "visible_pixels", "objects_in_view")
 METRICS = (
     *SHAPE_METRICS,
@@ -79,8 +79,9 @@ class RowLog:
 
 
 def variant_of(row: Mapping[str, Any]) -> Variant:
-    """The variant that a row belongs to."""
-    return Variant(**{name: row[name] for name in VARIANT})
+    """The variant that a row belongs to; rows of an older brrp have no weights."""
+    found: dict[str, Any] = {name: row.get(name) for name in VARIANT}
+    return Variant(**found)
 
 
 def variant_columns(variant: Variant) -> Row:

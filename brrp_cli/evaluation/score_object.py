@@ -31,18 +31,24 @@ PROBABILITY_METRICS = ("brier", "nll", "ause", "ause_entropy")
 
 
 def score_shape(
-    posterior: OccupancyPosterior, truth: TrueShape, rng: np.random.Generator
+    posterior: OccupancyPosterior,
+    truth: TrueShape,
+    rng: np.random.Generator,
+    level: float = LEVEL,
 ) -> dict[str, float]:
     """`SHAPE_METRICS`, lengths in metres; a Chamfer distance is NaN if nothing is occupied.
+
+    level : occupancy at the method's surface
 
     iou, chamfer : as the published tables take them; *_exact : the same against the mesh that was
     not thickened; iou_5mm, f_score_1cm : on the fine grid, against that mesh too.
     """
     probability = posterior.probability(truth.grid)
     side = round(len(truth.grid) ** (1 / 3))
-    occupied = probability > LEVEL
+    occupied = probability > level
     count = len(truth.closed_surface)
-    coarse = _surface_points(probability.reshape(side, side, side), truth.T_cam_grid, count, rng)
+    volume = probability.reshape(side, side, side)
+    coarse = _surface_points(volume, truth.T_cam_grid, level, count, rng)
     fine = posterior.probability_volume(truth.fine)
     T_cam_fine = similarity(FINE, translation=np.array([axis[0] for axis in truth.fine]))
     return {
@@ -50,8 +56,10 @@ def score_shape(
         "chamfer": chamfer(coarse, truth.closed_surface),
         "iou_exact": iou(occupied, truth.exact),
         "chamfer_exact": chamfer(coarse, truth.exact_surface),
-        "iou_5mm": iou(fine > LEVEL, truth.fine_exact),
-        "f_score_1cm": f_score(_surface_points(fine, T_cam_fine, count, rng), truth.exact_surface),
+        "iou_5mm": iou(fine > level, truth.fine_exact),
+        "f_score_1cm": f_score(
+            _surface_points(fine, T_cam_fine, level, count, rng), truth.exact_surface
+        ),
     }
 
 
@@ -109,16 +117,16 @@ def placement_error(placed: Retrieved, stored: PriorObject, truth: TrueShape) ->
 
 
 def level_set(
-    volume: NDArray[np.floating], T_target_grid: NDArray[np.floating]
+    volume: NDArray[np.floating], T_target_grid: NDArray[np.floating], level: float = LEVEL
 ) -> trimesh.Trimesh | None:
-    """Marching cubes at 0.5 on a volume (nx, ny, nz); vertices in the target frame. None if no
+    """Marching cubes at `level` on a volume (nx, ny, nz); vertices in the target frame. None if no
     surface passes through the volume."""
     import trimesh
     from skimage.measure import marching_cubes
 
-    if not volume.min() < LEVEL < volume.max():
+    if not volume.min() < level < volume.max():
         return None
-    vertices, faces, _, _ = marching_cubes(volume, LEVEL, gradient_direction="ascent")
+    vertices, faces, _, _ = marching_cubes(volume, level, gradient_direction="ascent")
     return trimesh.Trimesh(
         transform_points(T_target_grid, vertices.astype(np.float64)), faces, process=False
     )
@@ -127,9 +135,10 @@ def level_set(
 def _surface_points(
     volume: NDArray[np.floating],
     T_cam_grid: NDArray[np.floating],
+    level: float,
     count: int,
     rng: np.random.Generator,
 ) -> NDArray[np.float64]:
     """Points (count, 3) of the level set; (0, 3) if there is none."""
-    mesh = level_set(volume, T_cam_grid)
+    mesh = level_set(volume, T_cam_grid, level)
     return np.zeros((0, 3)) if mesh is None else sample_surface(mesh, count, rng)

@@ -96,13 +96,14 @@ def differences(
 ) -> dict[tuple[Variant, Variant], dict[str, Interval]]:
     """Mean difference, a variant less a baseline, over the objects that have a value in both.
 
-    The baselines are the variants without a prior; pairs differ in nothing else but the method.
+    A baseline knows less of objects: one without a prior against one with it, one that was not
+    trained against one that was. The masks of a pair are shifted alike.
     """
     values = {(variant_of(row), row["scene"], row["object_id"]): row for row in rows}
     result = {}
     for variant in variants:
         for baseline in variants:
-            if variant.preset is None or baseline.preset is not None:
+            if _knowledge(variant) <= _knowledge(baseline):
                 continue
             if variant.shift != baseline.shift:
                 continue
@@ -120,6 +121,11 @@ def differences(
                 for name in metrics
             }
     return result
+
+
+def _knowledge(variant: Variant) -> int:
+    """2 with a prior, 1 after training, 0 with neither."""
+    return 2 if variant.preset is not None else int(variant.weights is not None)
 
 
 def as_record(summary: VariantSummary) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""What is compared in one evaluation: methods, presets, k, retrievers, shifted masks."""
+"""What is compared in one evaluation: methods, presets, k, retrievers, weights, shifted masks."""
 
 from __future__ import annotations
 
@@ -17,9 +17,10 @@ _AFTER_RETRIEVAL = ("preset", "k", "inference", "surface")
 
 @dataclass(frozen=True, order=True)
 class Variant:
-    """One way to run. `preset`, `k` and `retriever` are None where a method has no prior.
+    """One way to run. `preset`, `k` and `retriever` are None where a method has no prior, `weights`
+    where it was not trained.
 
-    shift : pixels by which the masks are moved to the right
+    shift : pixels by which the masks are moved to the right; weights : name of what was trained
     """
 
     method: str
@@ -27,6 +28,7 @@ class Variant:
     k: int | None = None
     retriever: str | None = None
     shift: int = 0
+    weights: str | None = None
 
     @property
     def label(self) -> str:
@@ -34,6 +36,8 @@ class Variant:
         parts = [self.method]
         if self.preset is not None:
             parts += [self.preset, f"k={self.k}", str(self.retriever)]
+        if self.weights is not None:
+            parts.append(self.weights)
         if self.shift:
             parts.append(f"shifted {self.shift} px")
         return " ".join(parts)
@@ -55,6 +59,7 @@ class Variant:
             "retriever": self.retriever,
             "shift": self.shift,
             "config": decides,
+            **({} if self.weights is None else {"weights": self.weights}),
         }
 
     @property
@@ -70,16 +75,23 @@ def expand(
     ks: Sequence[int],
     retrievers: Sequence[str],
     shifts: Sequence[int],
+    weights: Sequence[str] = (),
 ) -> list[Variant]:
     """All combinations that mean something, in the order given, each once.
 
-    No k at all is the presets' own. Errors: BrrpError for an unknown method or preset.
+    No k at all is the presets' own. Errors: BrrpError for an unknown method or preset, or for a
+    method that was trained without the name of any weights.
     """
     for name in methods:
         if name not in METHODS:
             raise BrrpError("No such method", found=name, expected=", ".join(METHODS))
     found: list[Variant] = []
     for method, shift in product(methods, shifts):
+        if METHODS[method].uses_weights:
+            if not weights:
+                raise BrrpError(f"{method} needs trained weights", fix="pass --weights FILE")
+            found += [Variant(method, shift=shift, weights=name) for name in weights]
+            continue
         if not METHODS[method].uses_prior:
             found.append(Variant(method, shift=shift))
             continue

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from brrp_cli.config import ObservationConfig
 from brrp_cli.dependencies import import_open3d
+from brrp_cli.geometry import normalise, similarity
 from brrp_cli.seeds import child_seed
 
 MIN_PLANE_POINTS = 100
@@ -86,3 +87,12 @@ def largest_plane(
         normal = np.linalg.eigh(spread.T @ spread)[1][:, 0]
         model = np.append(normal, -normal @ middle)
     return model
+
+
+def plane_frame(plane: Plane) -> NDArray[np.float64]:
+    """T_plane_cam (4, 4): z along the plane's normal, z = 0 on the plane; x and y arbitrary but
+    always the same."""
+    helper = np.eye(3)[np.argmin(np.abs(plane.normal))]
+    x = normalise(np.cross(plane.normal, helper))
+    rotation = np.stack([x, np.cross(plane.normal, x), plane.normal])
+    return similarity(rotation=rotation, translation=np.array([0, 0, plane.offset]))

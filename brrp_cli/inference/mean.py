@@ -14,6 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import binary_dilation, map_coordinates
 
+from brrp_cli.completion.around import SeenPart, lengths
+from brrp_cli.completion.network import fitted
 from brrp_cli.config import MeanConfig
 from brrp_cli.frames.frame import BACKGROUND, Frame
 from brrp_cli.frames.lookup import at_pixels, depth_behind
@@ -80,9 +82,10 @@ def shape_logits(distance: Array, evidence: float, config: MeanConfig) -> Array:
     return np.asarray(logits)
 
 
-def visible_logits(distance: Array, config: MeanConfig) -> Array:
-    """Logits of the shape of what was seen: less sure inside than outside."""
-    return np.clip(-distance / config.visible_width, -config.limit, config.visible_limit)
+def completed_logits(points: Array, part: SeenPart, config: MeanConfig) -> Array:
+    """Logits (n,) at points (n, 3), metres, camera frame, of an object that is none of the stored
+    ones."""
+    return np.clip(fitted().logits(lengths(points, part)), -config.limit, config.limit)
 
 
 def empty_space(

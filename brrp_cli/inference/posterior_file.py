@@ -7,7 +7,8 @@
     /objects/ID/mean    (C, nx, ny, nz) float16, logits, with prior means
     /objects/ID/which   (P,) int64, the mean of each particle, with prior means
 
-These are BRRP's particles; for what V-PRISM leaves see `brrp_cli/methods/vprism_file.py`.
+These are BRRP's particles; for what V-PRISM and PointSDF leave see `vprism_file.py` and
+`pointsdf_file.py` in `brrp_cli/methods/`.
 Points are asked in the camera frame, metres, whatever frame the meshes were written in.
 """
 
@@ -24,7 +25,9 @@ from brrp_cli.inference.hinge import HingeGrid
 from brrp_cli.inference.hypothesis_posterior import HypothesisPosterior
 from brrp_cli.inference.mean import MeanLattice
 from brrp_cli.inference.posterior import HilbertPosterior
+from brrp_cli.methods import pointsdf_file
 from brrp_cli.methods.base import OccupancyPosterior
+from brrp_cli.methods.pointsdf import PointSDFPosterior
 from brrp_cli.methods.vprism import VPrismPosterior
 from brrp_cli.methods.vprism_file import read_map, read_object, write_map, write_object
 
@@ -32,13 +35,13 @@ if TYPE_CHECKING:
     import h5py
 
 SCHEMA = 2
-MAP = "map"
+MAP, DECODER = "map", "decoder"
 
 
 def save_posteriors(posteriors: Mapping[int, OccupancyPosterior], path: Path) -> None:
     """Write the posteriors of a frame's objects; the same posteriors give the same bytes.
 
-    V-PRISM's objects share the map of one frame, which is written once.
+    V-PRISM's objects share the map of one frame, PointSDF's a decoder, which is written once.
     """
     import h5py
 
@@ -51,6 +54,10 @@ def save_posteriors(posteriors: Mapping[int, OccupancyPosterior], path: Path) ->
                 if MAP not in file:
                     write_map(file.create_group(MAP), posterior.scene)
                 write_object(group, posterior)
+            elif isinstance(posterior, PointSDFPosterior):
+                if DECODER not in file:
+                    pointsdf_file.write_decoder(file.create_group(DECODER), posterior.decoder)
+                pointsdf_file.write_object(group, posterior)
             elif isinstance(posterior, HilbertPosterior):
                 _write(group, posterior)
             elif isinstance(posterior, HypothesisPosterior):
@@ -115,6 +122,9 @@ def open_posterior(path: str | Path) -> dict[int, OccupancyPosterior]:
             if MAP in file:
                 scene = read_map(file[MAP])
                 return {i: read_object(group, scene) for i, group in groups.items()}
+            if DECODER in file:
+                decoder = pointsdf_file.read_decoder(file[DECODER])
+                return {i: pointsdf_file.read_object(g, decoder) for i, g in groups.items()}
             return {i: _read(group) for i, group in groups.items()}
     except (OSError, KeyError, ValueError) as error:
         raise BrrpError(

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from brrp_cli.completion.around import seen_part
 from brrp_cli.config import Config, HypothesesConfig, WeighConfig
 from brrp_cli.frames.frame import Frame
 from brrp_cli.frames.observe import ObjectObservation
@@ -17,12 +18,11 @@ from brrp_cli.inference.infer import LabelledPoints
 from brrp_cli.inference.infer_hypotheses import Problem, infer_correction
 from brrp_cli.inference.mean import (
     MeanLattice,
+    completed_logits,
     empty_space,
     lattice_over,
     shape_logits,
-    visible_logits,
 )
-from brrp_cli.inference.visible_shape import visible_shape
 from brrp_cli.methods.base import OK, ObjectReconstruction, Retrieved
 from brrp_cli.methods.check_prior import no_distances
 from brrp_cli.methods.timing import timed
@@ -132,25 +132,23 @@ def _infer(
 ) -> HypothesisPosterior:
     """Only hypotheses that a particle may get cost a mean function."""
     kept = np.flatnonzero(weights > 0.5 / config.map.particles / len(weights))
-    visible = visible_shape(observation.points, plane, config.visible)
+    part = seen_part(observation.points, frame, observation.object_id, plane, config.completion)
     extent = np.concatenate(
-        [visible.extent if i == len(placed) else _surface(placed[i]) for i in kept]
+        [part.extent if i == len(placed) else _surface(placed[i]) for i in kept]
         + [observation.points]
     )
     margin = config.map.margin
     box = np.stack([extent.min(axis=0) - margin, extent.max(axis=0) + margin])
     lower, spacing, nodes = lattice_over(box, config.mean)
     points = nodes.reshape(-1, 3)
-    logits = np.stack(
-        [
-            visible_logits(visible.signed_distance(points), config.mean)
-            if i == len(placed)
-            else shape_logits(_distance(placed[i], points), placed[i].evidence, config.mean)
-            for i in kept
-        ]
-    )
     empty = empty_space(points, frame, observation.object_id, plane, config.mean)
-    logits[:, empty] = -config.mean.limit
+    logits = np.full((len(kept), len(points)), -config.mean.limit)
+    for row, i in enumerate(kept):
+        logits[row, ~empty] = (
+            completed_logits(points[~empty], part, config.mean)
+            if i == len(placed)
+            else shape_logits(_distance(placed[i], points[~empty]), placed[i].evidence, config.mean)
+        )
     values = logits.reshape(-1, *nodes.shape[:3])
     mean = MeanLattice(lower, spacing, values.astype(np.float16), outside=-config.mean.limit)
     return infer_correction(

@@ -4,38 +4,50 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
+from functools import lru_cache
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from brrp_cli.config import Config, VPrismConfig
+from brrp_cli.config import Config, PointSDFConfig, VPrismConfig
 from brrp_cli.frames.frame import Frame
 from brrp_cli.methods.base import ObjectReconstruction
 
 if TYPE_CHECKING:
+    from brrp_cli.pointsdf.network import PointSDF
     from brrp_cli.prior.store import Prior
     from brrp_cli.retrieval.base import Retriever
 
 
+HALF = 0.5
+
+
 @dataclass(frozen=True)
 class Setup:
-    """What a method may need besides the frame; prior and retriever only where it uses a prior."""
+    """What a method may need besides the frame; prior and retriever only where it uses a prior,
+    weights where it was trained."""
 
     config: Config
     seed: int
     device: str = "cpu"
     prior: Prior | None = None
     retriever: Retriever | None = None
+    weights: Path | None = None
 
 
 @dataclass(frozen=True)
 class Method:
     """run : all objects of a frame, by id; configuration : what decides its results, plain JSON;
     uses_prior : whether presets, k and retrievers mean something to it; gives_shapes : whether it
-    reconstructs, or is there to be measured alone."""
+    reconstructs, or is there to be measured alone; uses_weights : whether it was trained;
+    uses_cuda : whether it runs there too; level : occupancy at its surface."""
 
     run: Callable[[Frame, Setup], list[ObjectReconstruction]]
     configuration: Callable[[Config], dict[str, Any]]
     uses_prior: bool
     gives_shapes: bool = True
+    uses_weights: bool = False
+    uses_cuda: bool = True
+    level: Callable[[Config], float] = lambda config: HALF
 
 
 def _brrp(frame: Frame, setup: Setup) -> list[ObjectReconstruction]:
@@ -73,10 +85,40 @@ def _vprism_configuration(config: Config) -> dict[str, Any]:
     return asdict(VPrismConfig())
 
 
+def _pointsdf(frame: Frame, setup: Setup) -> list[ObjectReconstruction]:
+    from brrp_cli.api import pick_device
+    from brrp_cli.methods.pointsdf import reconstruct_pointsdf
+
+    assert setup.weights is not None
+    network = _network(setup.weights, pick_device(setup.device))
+    return reconstruct_pointsdf(frame, network, PointSDFConfig())
+
+
+@lru_cache(maxsize=4)
+def _network(weights: Path, device: str) -> PointSDF:
+    """Read once for all frames of a process."""
+    from brrp_cli.pointsdf.weights import load_weights
+
+    return load_weights(weights).network.to(device)
+
+
+def _pointsdf_configuration(config: Config) -> dict[str, Any]:
+    return asdict(PointSDFConfig())
+
+
 METHODS = {
-    "brrp": Method(_brrp, Config.as_dict, uses_prior=True),
+    "brrp": Method(
+        _brrp, Config.as_dict, uses_prior=True, level=lambda config: config.surface.level
+    ),
     "retrieval": Method(_retrieval, Config.as_dict, uses_prior=True, gives_shapes=False),
-    "vprism": Method(_vprism, _vprism_configuration, uses_prior=False),
+    "vprism": Method(_vprism, _vprism_configuration, uses_prior=False, uses_cuda=False),
+    "pointsdf": Method(
+        _pointsdf,
+        _pointsdf_configuration,
+        uses_prior=False,
+        uses_weights=True,
+        level=lambda config: PointSDFConfig().level,
+    ),
 }
 
 # Those that reconstruct.

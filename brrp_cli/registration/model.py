@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 from brrp_cli.geometry import similarity
+from brrp_cli.methods.check_prior import no_distances
 from brrp_cli.prior.objects import PriorObject
 
 # Surface points that the coarse search and ICP use. The stored points come in random order, so that
@@ -28,10 +27,15 @@ class Model:
     surface: NDArray[np.float64]
     normals: NDArray[np.float64]
 
-    @cached_property
-    def tree(self) -> cKDTree:
-        """For distances to the whole surface."""
-        return cKDTree(self.surface)
+    def signed_distance(self, points: NDArray[np.floating]) -> NDArray[np.float64]:
+        """Distance (n,), metres, of points (n, 3) to the surface, negative inside.
+
+        Errors: PriorError if the prior was made without distances.
+        """
+        if self.stored.distances is None:
+            raise no_distances(self.stored.name)
+        unit = self.stored.half_extent
+        return self.stored.distances.signed_distance(points / unit) * unit
 
     @property
     def T_model_object(self) -> NDArray[np.float64]:

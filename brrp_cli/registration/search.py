@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brrp_cli.config import FeatureConfig, SearchConfig
-from brrp_cli.geometry import similarity
+from brrp_cli.geometry import similarity, transform_points
 from brrp_cli.registration.model import COARSE, FINE, Model
 from brrp_cli.registration.refine import refine
 from brrp_cli.registration.scan import ObservedCloud
@@ -50,7 +50,7 @@ def search(
     config: SearchConfig,
     seed: int,
 ) -> list[Hypothesis]:
-    """The best placements of one model, best first, `config.kept` at most."""
+    """The best placements of one model that differ in shape, best first, `config.kept` at most."""
     starts = matched_starts(model, observed, features, config.matching, config.matchings, seed)
     if testimony.plane is not None:
         starts += resting_starts(model, testimony.points, testimony.plane, config.turns)
@@ -64,7 +64,25 @@ def search(
         resized = np.stack([_resize(parent, scale, testimony) for parent in parents])
         resized = _refined(resized, model, testimony, config.scale_distance, config.coarse_points)
         found += _judged(resized, scale, model, testimony, config)
-    return sorted(found, key=lambda each: -each.evidence)[: config.kept]
+    return _distinct(sorted(found, key=lambda each: -each.evidence), config)
+
+
+def _distinct(found: list[Hypothesis], config: SearchConfig) -> list[Hypothesis]:
+    """Without those whose surface lies within `config.distinct` metres, on average, of that of a
+    better one: a ball turned about its middle is one hypothesis, not many."""
+    kept: list[Hypothesis] = []
+    for each in found:
+        surface = transform_points(each.T_cam_model, each.model.surface[:COARSE])
+        apart = (
+            np.abs(other.model.signed_distance(transform_points(T_model_cam, surface))).mean()
+            for other in kept
+            for T_model_cam in [np.linalg.inv(other.T_cam_model)]
+        )
+        if all(distance > config.distinct for distance in apart):
+            kept.append(each)
+        if len(kept) == config.kept:
+            break
+    return kept
 
 
 def _best(

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brrp_cli.config import FeatureConfig, RegistrationConfig
-from brrp_cli.frames.plane import Plane
+from brrp_cli.frames.plane import Plane, plane_frame
 from brrp_cli.geometry import normalise, similarity, transform_points
 from brrp_cli.registration.model import COARSE, Model
 from brrp_cli.registration.ransac import match_features
@@ -17,29 +17,46 @@ Array = NDArray[np.float64]
 
 # Fewer model points than these facing the camera say nothing about where its seen side ends.
 MIN_FACING = 6
+# Points at the edge of a mask may be of what lies behind: so many of each side are left out of the
+# box of what is seen.
+STRAY = 0.02
+# Metres by which the model's visible side must be longer than what is seen of it before the seen
+# part is taken for either end of it too.
+HIDDEN = 0.015
 
 
 def resting_starts(model: Model, points: Array, plane: Plane, turns: int) -> list[Array]:
     """T_cam_model (4, 4) of the model in each resting pose, turned about the plane's normal.
 
     points : (n, 3) observed, metres, camera frame. Along the plane, the box of the model's side
-    that faces the camera is laid over the box of the observed points.
+    that faces the camera is laid over the box of the observed points. Where that side is longer
+    than what is seen, a part of it is hidden, and what is seen is laid over each of its ends too.
     """
     T_plane_cam = plane_frame(plane)
     T_cam_plane = np.linalg.inv(T_plane_cam)
-    seen = transform_points(T_plane_cam, points)
-    middle = (seen.min(axis=0) + seen.max(axis=0))[:2] / 2
+    seen = np.asarray(transform_points(T_plane_cam, points))[:, :2]
+    middle = np.quantile(seen, [STRAY, 1 - STRAY], axis=0).mean(axis=0)
     camera = T_plane_cam[:3, 3]
     surface, normals = model.surface[:COARSE], model.normals[:COARSE]
     starts = []
     for T_plane_model in model.resting:
+        along = _longest(np.asarray(transform_points(T_plane_model, surface), dtype=np.float64))
         for angle in np.arange(turns) * (2 * np.pi / turns):
             T = _turn(angle) @ T_plane_model
             placed = _lay_over(T, np.asarray(transform_points(T, surface)), middle)
             facing = np.einsum("ij,ij->i", camera - placed, normals @ T[:3, :3].T) > 0
             if facing.sum() >= MIN_FACING:
-                _lay_over(T, placed[facing], middle)
+                placed = _lay_over(T, placed[facing], middle)
             starts.append(T_cam_plane @ T)
+            direction = _turn(angle)[:2, :2] @ along
+            hidden = np.ptp(placed[:, :2] @ direction) - np.ptp(
+                np.quantile(seen @ direction, [STRAY, 1 - STRAY])
+            )
+            if hidden > HIDDEN:
+                for shift in (hidden / 2, -hidden / 2):
+                    slid = T.copy()
+                    slid[:2, 3] += shift * direction
+                    starts.append(T_cam_plane @ slid)
     return starts
 
 
@@ -74,13 +91,10 @@ def matched_starts(
     return starts
 
 
-def plane_frame(plane: Plane) -> Array:
-    """T_plane_cam (4, 4): z along the plane's normal, z = 0 on the plane; x and y arbitrary but
-    always the same."""
-    helper = np.eye(3)[np.argmin(np.abs(plane.normal))]
-    x = normalise(np.cross(plane.normal, helper))
-    rotation = np.stack([x, np.cross(plane.normal, x), plane.normal])
-    return similarity(rotation=rotation, translation=np.array([0, 0, plane.offset]))
+def _longest(points: Array) -> Array:
+    """Unit direction (2,) along the plane in which points (n, 3), plane frame, reach furthest."""
+    footprint = points[:, :2]
+    return np.asarray(np.linalg.svd(footprint - footprint.mean(axis=0), full_matrices=False)[2][0])
 
 
 def _turn(angle: float) -> Array:

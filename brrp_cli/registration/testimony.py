@@ -57,9 +57,8 @@ class Testimony:
         in_model = np.einsum(
             "bij,bnj->bni", np.linalg.inv(linear), seen - T_cam_model[:, None, :3, 3]
         )
-        reach = 1.5 * config.far
-        distance, _ = model.tree.query(in_model.reshape(-1, 3), distance_upper_bound=reach)
-        distance = np.minimum(distance.reshape(in_model.shape[:2]), reach) * scale[:, None]
+        distance = np.abs(model.signed_distance(in_model.reshape(-1, 3)))
+        distance = distance.reshape(in_model.shape[:2]) * scale[:, None]
         near = np.exp(-0.5 * (distance / config.near) ** 2).mean(axis=1)
         far = (np.minimum(distance, config.far) / config.far).mean(axis=1)
         return np.asarray(near - config.distance * far)

@@ -17,7 +17,6 @@ from brrp_cli.inference.mean import (
     empty_space,
     lattice_over,
     shape_logits,
-    visible_logits,
 )
 
 CONFIG = MeanConfig()
@@ -104,12 +103,6 @@ def test_less_evidence_makes_a_softer_surface_in_the_same_place():
     # Half a unit below `sure` adds half of `doubt` to the width.
     width = CONFIG.width + CONFIG.doubt / 2
     assert shape_logits(near, CONFIG.sure - 0.5, CONFIG)[2] == pytest.approx(-0.002 / width)
-
-
-def test_the_shape_of_what_was_seen_is_less_sure_inside_than_outside():
-    found = visible_logits(np.array([-0.5, 0.0, CONFIG.visible_width, 0.5]), CONFIG)
-    np.testing.assert_allclose(found, [CONFIG.visible_limit, 0, -1, -CONFIG.limit])
-    assert CONFIG.visible_limit < CONFIG.limit
 
 
 # An image of 80 x 100: a wall at 2 m, object 1 at 1 m in columns 40 to 49, object 2 at 1 m in

@@ -23,7 +23,8 @@ def test_weights_are_a_distribution_over_hypotheses_and_the_unknown():
 
 def test_the_formula_on_numbers():
     """P(c|R) exp(25 evidence): 0.6 and 0.2 of 0.8, unknown 0.2 with evidence 0.65."""
-    weights = weigh([0.6, 0.2], [0.6, 0.64], 0.2, CONFIG)
+    config = WeighConfig(sharpness=25.0, unknown_evidence=0.65)
+    weights = weigh([0.6, 0.2], [0.6, 0.64], 0.2, config)
     raw = np.array([0.6 * np.exp(25 * 0.6), 0.2 * np.exp(25 * 0.64), 0.2 * np.exp(25 * 0.65)])
     np.testing.assert_allclose(weights, raw / raw.sum())
 
@@ -47,7 +48,7 @@ def test_equal_hypotheses_have_equal_weights():
 
 def test_what_the_retriever_does_not_know_is_unknown_unless_evidence_is_beyond_doubt():
     assert weigh([0.0, 0.0], [0.6, 0.5], 1.0, CONFIG)[-1] > 0.9
-    assert weigh([0.0, 0.0], [0.9, 0.5], 1.0, CONFIG)[-1] < 0.1
+    assert weigh([0.0, 0.0], [0.95, 0.5], 1.0, CONFIG)[-1] < 0.1
 
 
 def test_a_retriever_that_knows_nothing_is_no_other_than_one_that_knows_next_to_nothing():
@@ -58,11 +59,13 @@ def test_a_retriever_that_knows_nothing_is_no_other_than_one_that_knows_next_to_
 def test_a_retriever_that_is_certain_may_still_be_wrong():
     """It says that the object is stored: where nothing fits, it is something else all the same."""
     assert weigh([1.0], [0.2], 0.0, CONFIG)[-1] > 0.9
-    assert weigh([1.0], [0.9], 0.0, CONFIG)[-1] < 0.01
+    assert weigh([1.0], [0.95], 0.0, CONFIG)[-1] < 0.01
 
 
 def test_the_more_is_missing_the_more_weight_has_the_unknown():
-    found = [weigh([1 - m], [0.65], m, CONFIG)[-1] for m in np.linspace(0, 1, 11)]
+    found = [
+        weigh([1 - m], [CONFIG.unknown_evidence], m, CONFIG)[-1] for m in np.linspace(0, 1, 11)
+    ]
     assert (np.diff(found) >= -1e-12).all()
     assert found[0] == pytest.approx(CONFIG.least_unknown)
     assert found[-1] == pytest.approx(CONFIG.most_unknown)

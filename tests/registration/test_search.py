@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from table_scene import MESHES, PARAMETERS, TABLE, in_camera, photograph, placed, stored
@@ -77,6 +79,40 @@ def test_without_a_plane_feature_matchings_are_enough():
     truth = placed(0.02, -0.03, 1.2) @ over
     best = find("ell", truth, plane=None)[0]
     assert errors(best, truth).max() < 0.002
+
+
+def test_an_object_is_found_whose_one_end_is_hidden():
+    """A long box of which a screen in front lets a third be seen."""
+    truth = placed(0.0, 0.0, 0.1)
+    frame = photograph({ID: in_camera(MESHES["ell"](), truth)})
+    shown = frame.segmap == ID
+    columns = np.flatnonzero(shown.any(axis=0))
+    screen = shown & (np.arange(shown.shape[1]) > columns[0] + len(columns) // 2)
+    points = frame.points.copy()
+    points[screen] *= 0.8
+    segmap = np.where(screen, ID + 1, frame.segmap)
+    frame = replace(frame, points=points, segmap=segmap)
+    seen = np.random.default_rng(0).permutation(frame.object_points(ID)).astype(np.float64)
+    found = search(
+        search_model(stored("ell")),
+        observed_cloud(seen, PARAMETERS.features),
+        testimony.Testimony(seen, frame, TABLE),
+        PARAMETERS.features,
+        CONFIG,
+        0,
+    )
+    assert errors(found[0], truth).max() < 0.003
+
+
+@pytest.mark.parametrize("name", ["box", "ell"])
+def test_hypotheses_differ_in_shape(name):
+    """A box looks the same turned by half a circle: that is one hypothesis."""
+    found = find(name, placed(-0.04, 0.02, 0.6))
+    for i, one in enumerate(found):
+        surface = transform_points(one.T_cam_model, one.model.surface[:300])
+        for other in found[:i]:
+            local = transform_points(np.linalg.inv(other.T_cam_model), surface)
+            assert np.abs(other.model.signed_distance(local)).mean() > CONFIG.distinct
 
 
 def test_the_same_seed_gives_the_same_bytes():

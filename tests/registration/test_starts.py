@@ -9,11 +9,11 @@ import pytest
 from table_scene import NORMAL, TABLE, box, in_camera, photograph, placed, stored
 
 from brrp_cli.config import FeatureConfig, RegistrationConfig
-from brrp_cli.frames.plane import Plane
+from brrp_cli.frames.plane import Plane, plane_frame
 from brrp_cli.geometry import normalise, transform_points
 from brrp_cli.registration.model import search_model
 from brrp_cli.registration.scan import observed_cloud
-from brrp_cli.registration.starts import matched_starts, plane_frame, resting_starts
+from brrp_cli.registration.starts import matched_starts, resting_starts
 
 BOX, TURNS = 5, 12
 FEATURES = FeatureConfig(scales=(0.4, 0.5, 0.6))
@@ -57,9 +57,22 @@ def test_the_stored_model_has_its_true_size(model):
     np.testing.assert_allclose(model.surface.mean(axis=0), 0, atol=0.005)
 
 
-def test_one_start_for_each_resting_pose_and_turn(model, starts):
+@pytest.fixture(scope="module")
+def poses(starts):
+    """The starts of one turn each: one, or one and two that are slid along the plane."""
+    groups: list[list[np.ndarray]] = []
+    for T in starts:
+        if groups and np.allclose(groups[-1][0][:3, :3], T[:3, :3]):
+            groups[-1].append(T)
+        else:
+            groups.append([T])
+    return groups
+
+
+def test_one_start_for_each_resting_pose_and_turn_and_two_where_a_part_is_hidden(model, poses):
     assert len(model.resting) == 6, "a box rests on each of its sides"
-    assert len(starts) == 6 * TURNS
+    assert len(poses) == 6 * TURNS
+    assert {len(group) for group in poses} == {1, 3}
 
 
 def test_every_start_is_rigid_and_stands_on_the_plane(model, starts):
@@ -69,8 +82,9 @@ def test_every_start_is_rigid_and_stands_on_the_plane(model, starts):
         assert height.min() == pytest.approx(0, abs=1e-3)
 
 
-def test_the_starts_are_the_resting_poses_turned(model, starts):
+def test_the_starts_are_the_resting_poses_turned(poses):
     """Each side is up as often as another, and turns divide the circle evenly."""
+    starts = [group[0] for group in poses]
     up = np.array([T[:3, :3].T @ NORMAL for T in starts])
     sides, counts = np.unique(up.round(6), axis=0, return_counts=True)
     assert sorted(np.abs(sides).sum(axis=1)) == [1] * 6
@@ -81,17 +95,48 @@ def test_the_starts_are_the_resting_poses_turned(model, starts):
         assert angle == pytest.approx(2 * np.pi / TURNS)
 
 
-def test_the_side_that_faces_the_camera_lies_over_what_was_seen(model, points, starts):
-    T_plane_cam = plane_frame(TABLE)
-    seen = transform_points(T_plane_cam, points)[:, :2]
-    middle = (seen.min(axis=0) + seen.max(axis=0)) / 2
-    for T in starts:
-        placed_points = transform_points(T, model.surface)
-        facing = np.einsum("ij,ij->i", -placed_points, model.normals @ T[:3, :3].T) > 0
-        front = transform_points(T_plane_cam, placed_points[facing])[:, :2]
-        found = (front.min(axis=0) + front.max(axis=0)) / 2
+def extents(T, model, direction=None):
+    """Least and greatest coordinates along the plane of the model's side that faces the camera."""
+    placed_points = transform_points(T, model.surface)
+    facing = np.einsum("ij,ij->i", -placed_points, model.normals @ T[:3, :3].T) > 0
+    front = transform_points(plane_frame(TABLE), placed_points[facing])[:, :2]
+    front = front if direction is None else front @ direction
+    return front.min(axis=0), front.max(axis=0)
+
+
+def seen_along_plane(points):
+    return transform_points(plane_frame(TABLE), points)[:, :2]
+
+
+def test_the_side_that_faces_the_camera_lies_over_what_was_seen(model, points, poses):
+    low, high = np.quantile(seen_along_plane(points), [0.02, 0.98], axis=0)
+    for first, *_ in poses:
         # The starts look at fewer points, which reach not quite as far.
-        np.testing.assert_allclose(found, middle, atol=0.02)
+        np.testing.assert_allclose(
+            np.mean(extents(first, model), axis=0), (low + high) / 2, atol=0.02
+        )
+
+
+def test_where_more_is_hidden_each_end_is_tried_as_the_seen_one(model, points, poses):
+    seen = seen_along_plane(points)
+    for first, *slid in poses:
+        if not slid:
+            continue
+        ends = np.array([T[:3, 3] - first[:3, 3] for T in slid])
+        np.testing.assert_allclose(ends[0], -ends[1], atol=1e-9)
+        np.testing.assert_allclose(ends @ NORMAL, 0, atol=1e-9)
+        shift = (plane_frame(TABLE)[:3, :3] @ ends[0])[:2]
+        direction = normalise(shift)
+        low, high = np.quantile(seen @ direction, [0.02, 0.98])
+        (least, _), (_, most) = (extents(T, model, direction) for T in slid)
+        np.testing.assert_allclose([least, most], [low, high], atol=0.02)
+
+
+def test_a_stray_point_moves_no_start(model, points, starts):
+    stray = np.concatenate([points, points[:1] + [0.3, 0.0, 0.2]])
+    again = resting_starts(model, stray, TABLE, TURNS)
+    assert len(again) == len(starts)
+    np.testing.assert_allclose(again, starts, atol=2e-3)
 
 
 def test_one_of_the_starts_is_near_the_truth(model, starts):

@@ -1,0 +1,1 @@
+"""The unseen side of an object that no stored one explains."""

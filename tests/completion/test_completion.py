@@ -1,0 +1,151 @@
+"""An object that no stored one explains: closed, on the plane, as large as what is seen."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from table_scene import TABLE, box, in_camera, photograph, placed
+
+from brrp_cli.completion.around import COUNT, lengths, seen_part
+from brrp_cli.completion.network import Network, fitted, from_bytes
+from brrp_cli.config import CompletionConfig, MeanConfig
+from brrp_cli.frames.plane import Plane
+from brrp_cli.geometry import transform_points
+from brrp_cli.inference.mean import completed_logits, empty_space
+from brrp_cli.shapes import solids
+
+CONFIG = CompletionConfig()
+
+
+def photographed(mesh, T_cam_mesh):
+    return photograph({5: in_camera(mesh, T_cam_mesh)})
+
+
+def part_of(frame, plane=TABLE, points=None):
+    points = frame.object_points(5) if points is None else points
+    return seen_part(points, frame, 5, plane, CONFIG)
+
+
+def inside(frame, points):
+    """What is occupied, more likely than not, and not seen to be empty."""
+    config = MeanConfig()
+    found = completed_logits(points, part_of(frame), config) > 0
+    return found & ~empty_space(points, frame, 5, TABLE, config)
+
+
+def iou(frame, T_cam_mesh, contains, half, count=20_000):
+    """With what `contains` says in the mesh's frame, twice as far out, half as high again."""
+    local = np.random.default_rng(0).uniform(-1, 1, (count, 3)) * half * [2, 2, 3]
+    local[:, 2] = np.abs(local[:, 2])
+    found, true = inside(frame, transform_points(T_cam_mesh, local)), contains(local)
+    return (found & true).sum() / (found | true).sum()
+
+
+def in_box(points):
+    return (np.abs(points - [0, 0, 0.07]) < [0.05, 0.03, 0.07]).all(axis=1)
+
+
+def in_can(points):
+    return (np.hypot(*points[:, :2].T) < 0.04) & (points[:, 2] < 0.12)
+
+
+@pytest.mark.parametrize("yaw", [0.1, 0.8, 2.0])
+def test_of_a_box_seen_from_above_at_an_angle_most_is_right(yaw):
+    T = placed(0.02, -0.03, yaw)
+    assert iou(photographed(box(), T), T, in_box, np.array([0.05, 0.03, 0.07])) > 0.75
+
+
+def test_of_a_can_seen_from_above_at_an_angle_most_is_right():
+    T = placed(-0.02, 0.03, 0.0)
+    mesh = solids.cylinder(0.04, 0.12)
+    assert iou(photographed(mesh, T), T, in_can, np.array([0.04, 0.04, 0.06])) > 0.8
+
+
+def test_it_stands_on_the_plane_and_does_not_stick_out_at_the_top():
+    T = placed(0.02, -0.03, 0.8)
+    foot, top, over, under = transform_points(
+        T, np.array([[0, 0, 0.01], [0, 0, 0.13], [0, 0, 0.155], [0, 0, -0.01]])
+    )
+    found = inside(photographed(box(), T), np.stack([foot, top, over, under]))
+    np.testing.assert_array_equal(found, [True, True, False, False])
+
+
+def test_a_cup_that_is_looked_into_stays_hollow():
+    T = placed(0.0, 0.0, 0.0)
+    frame = photographed(solids.beaker(0.04, 0.04, 0.06, 0.004), T)
+    middle, wall = transform_points(T, np.array([[0, 0, 0.04], [0, -0.038, 0.03]]))
+    probability = completed_logits(np.stack([middle, wall]), part_of(frame), MeanConfig())
+    assert empty_space(middle[None], frame, 5, TABLE, MeanConfig())[0] or probability[0] < 0
+
+
+def test_a_part_has_the_extents_of_what_is_seen():
+    T = placed(0.0, 0.0, 0.0)
+    frame = photographed(box(), T)
+    part = part_of(frame)
+    assert part.top == pytest.approx(0.14, abs=0.01)
+    assert part.width == pytest.approx(0.10, abs=0.012)
+    np.testing.assert_allclose(TABLE.signed_distance(part.feet), 0, atol=1e-9)
+    assert len(part.extent) == len(part.seen) + len(part.feet)
+    # A box is convex: what is seen of it lies in its hull's surface.
+    assert np.quantile(part.depths, 0.9) < 0.004
+
+
+def grid(count):
+    line = np.linspace(-0.03, 0.03, count)
+    x, y = np.meshgrid(line, line)
+    return np.column_stack([x.ravel(), y.ravel(), np.full(x.size, 0.8)])
+
+
+@pytest.mark.parametrize("plane", [None, Plane(np.array([0.0, -1.0, 0.0]), 0.05)])
+@pytest.mark.parametrize(
+    "points",
+    [
+        grid(15),
+        np.array([[0, 0, 0.8], [0.03, 0, 0.8], [0, 0.02, 0.8]]),
+        np.linspace([0, 0, 0.8], [0.1, 0, 0.8], 40),
+        np.array([[0.01, 0.0, 0.8]]),
+    ],
+    ids=["plane", "triangle", "line", "point"],
+)
+def test_flat_clouds_have_finite_lengths_and_are_empty_far_away(points, plane):
+    frame = photographed(box(), placed(0.0, 0.0, 0.3))
+    part = part_of(frame, plane, points)
+    probes = np.concatenate([points, [[0.0, 0.0, 1.2], [0.3, 0.0, 0.8]]])
+    found = lengths(probes, part)
+    assert found.shape == (len(probes), COUNT)
+    assert np.isfinite(found).all()
+    assert (fitted().logits(found)[-2:] < 0).all()
+
+
+def test_lengths_do_not_depend_on_other_points():
+    frame = photographed(box(), placed(0.02, -0.03, 0.8))
+    part = part_of(frame)
+    points = frame.object_points(5)[:50].astype(np.float64) + [0, 0, 0.02]
+    np.testing.assert_array_equal(lengths(points, part)[7:8], lengths(points[7:8], part))
+
+
+def network():
+    """max(0, x1 - x2) - 1 of inputs that are first moved by one and halved."""
+    return Network(
+        np.array([1, 1], np.float32),
+        np.array([2, 2], np.float32),
+        (
+            (np.array([[1], [-1]], np.float32), np.zeros(1, np.float32)),
+            (np.ones((1, 1), np.float32), np.array([-1], np.float32)),
+        ),
+    )
+
+
+def test_a_network_of_known_weights():
+    x = np.array([[5, 1], [1, 5], [3, 3]], np.float32)
+    np.testing.assert_allclose(network().logits(x), [1, -1, -1])
+
+
+def test_a_network_comes_back_from_its_bytes():
+    x = np.random.default_rng(0).normal(size=(20, 2)).astype(np.float32)
+    again = from_bytes(network().as_bytes())
+    np.testing.assert_array_equal(again.logits(x), network().logits(x))
+
+
+def test_the_network_of_the_package_takes_the_lengths():
+    assert fitted().middle.shape == (COUNT,)

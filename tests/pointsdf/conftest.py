@@ -1,0 +1,59 @@
+"""What several tests share: examples of one scene, and a network that has learnt them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pytest
+from eight_objects import NETWORK, write_scenes
+
+from brrp_cli.evaluation.scenes import Scene
+from brrp_cli.pointsdf.examples import Examples, Recipe, scene_examples
+
+STEPS, RATE = 300, 4e-3
+
+
+@dataclass(frozen=True)
+class Place:
+    """A folder with scenes, what was made of the first, and the weights that it was learnt to."""
+
+    folder: Path
+    scenes: list[Scene]
+    examples: Examples
+    fresh: Examples
+    weights: Path
+
+
+@pytest.fixture(scope="session")
+def place(tmp_path_factory) -> Place:
+    """Eight objects; `fresh` asks of the same clouds at other points."""
+    folder = tmp_path_factory.mktemp("pointsdf")
+    scenes = write_scenes(folder, 2)
+    one, other = (
+        scene_examples(
+            scenes[0],
+            folder,
+            Recipe("exact", NETWORK.points, queries=4096, seed=seed),
+            folder / "cache",
+        )
+        for seed in (0, 1)
+    )
+    return Place(folder, scenes, one, other, folder / "eight.safetensors")
+
+
+@pytest.fixture(scope="session")
+def learnt(place) -> Place:
+    """The same after a training that has learnt the eight by heart: one long epoch."""
+    from brrp_cli.pointsdf.training import Training, TrainingConfig
+
+    config = TrainingConfig(epochs=1, batch=8, queries=512, noise=0.0, learning_rate=RATE)
+    rows = np.tile(np.arange(8), STEPS)
+    seen = place.examples
+    often = Examples(
+        seen.clouds[rows], seen.queries[rows], seen.labels[rows], [seen.names[i] for i in rows]
+    )
+    training = Training(NETWORK, config, place.folder, place.weights, {"name": "eight"})
+    assert training.run(often, seen)
+    return place

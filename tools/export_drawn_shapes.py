@@ -1,0 +1,60 @@
+"""Export shapes drawn at random as closed meshes in metres.
+
+    python tools/export_drawn_shapes.py --count 150 --seed 5000 -o household
+    python tools/export_drawn_shapes.py --kind composed --count 200 -o composed
+
+household: hNNN_KIND.obj, boxes, cans, bottles, mugs, bowls, plates, tools and fruit of
+`brrp_cli/shapes`, of random dimensions. composed: cNNN.obj, solids of no kind, a few parts that run
+into each other. Each is drawn from its own random numbers, so that shape NNN of a seed is the same
+whatever the count.
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Any
+
+import click
+from tqdm import tqdm
+
+# The script also runs from a checkout that is not installed.
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+from brrp_cli.errors import BrrpError
+from brrp_cli.files import write_bytes
+from brrp_cli.seeds import child_rng
+from brrp_cli.shapes.composed import draw_composed_shape
+from brrp_cli.shapes.drawn import draw_household_shape
+
+
+def _household(seed: int, number: int) -> tuple[str, Any]:
+    kind, mesh = draw_household_shape(child_rng(seed, "household", number))
+    return f"h{number:03d}_{kind}", mesh
+
+
+def _composed(seed: int, number: int) -> tuple[str, Any]:
+    return f"c{number:03d}", draw_composed_shape(child_rng(seed, "composed", number))
+
+
+KINDS = {"household": _household, "composed": _composed}
+
+
+@click.command()
+@click.option("--kind", default="household", show_default=True, type=click.Choice(list(KINDS)))
+@click.option("--count", default=150, show_default=True, type=click.IntRange(1, 1000))
+@click.option("--seed", default=0, show_default=True)
+@click.option("-o", "--output", required=True, type=click.Path(path_type=Path))
+def main(kind: str, count: int, seed: int, output: Path) -> None:
+    """Export COUNT shapes to OUTPUT."""
+    try:
+        for number in tqdm(range(count), desc="shapes"):
+            name, mesh = KINDS[kind](seed, number)
+            write_bytes(output / f"{name}.obj", str(mesh.export(file_type="obj")).encode())
+    except BrrpError as error:
+        raise click.ClickException(str(error)) from error
+    click.echo(f"{output}: {count} shapes")
+
+
+if __name__ == "__main__":
+    main()
