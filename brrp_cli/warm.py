@@ -29,7 +29,8 @@ if TYPE_CHECKING:
 class Reconstructor:
     """Reconstructs frame after frame with one prior, one retriever and one maker of masks.
 
-    prior : opened, or the path of one; None with method "vprism", which has none
+    prior : opened, or the path of one; None with a method that has none ("vprism")
+    config, weights, seed, device : as in `reconstruct`
     retriever : a name as `brrp reconstruct --retriever` takes it
     prompt : makes masks of what it names where a frame has none; None = of what stands on the
         table, without a model
@@ -43,6 +44,7 @@ class Reconstructor:
         *,
         method: str = "brrp",
         config: Config | None = None,
+        weights: str | Path | None = None,
         retriever: str = "auto",
         clip_dir: Path | None = None,
         prompt: str | None = None,
@@ -51,6 +53,7 @@ class Reconstructor:
         device: str = "auto",
     ) -> None:
         self._method, self._seed, self._device, self._prompt = method, seed, device, prompt
+        self._weights = weights
         self._config = config or preset("default")
         self._prior = open_prior(Path(prior)) if isinstance(prior, (str, Path)) else prior
         self._retriever: Retriever | None = None
@@ -80,6 +83,7 @@ class Reconstructor:
             method=self._method,
             config=self._config,
             retriever=self._retriever,
+            weights=self._weights,
             seed=self._seed,
             device=self._device,
         )
