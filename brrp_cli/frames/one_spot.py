@@ -16,7 +16,7 @@ _CELL = 0.003
 # Mean cosine to the middle, of an inside that has a good part of the footprint and of any: the
 # inside of a round wall has 0.7 and more.
 _INWARD, _ALL_INWARD = 0.3, 0.65
-_ROUND = 0.35
+_ROUND = 0.35  # of both footprints, that the hull around them may hold besides
 _ABOVE = 0.02  # metres by which an inside may rise over its outside
 _SAME_RANGE = 0.3
 _STANDS = 0.04  # metres; what is nowhere lower does not stand on the table
@@ -25,10 +25,11 @@ _PIECES = 0.25  # of the smaller footprint, shared by pieces of one thing
 
 @dataclass(frozen=True)
 class Standing:
-    """One part as it stands: its cells of the plan, its middle there, its points and normals there
+    """One part as it stands: its cells of the plan, their bounding box, their middle in metres, its points and normals there
     (n, 2), and the heights between which nine tenths of it lie, metres."""
 
     cells: frozenset[tuple[int, int]]
+    box: tuple[NDArray[np.int64], NDArray[np.int64]]
     middle: Array
     plan: Array
     normals: Array
@@ -70,6 +71,8 @@ def join_on_one_spot(
             if touch[i, j] and _hangs(first, second):
                 same[i, j] = True
                 continue
+            if _apart(first, second):
+                continue
             shared = len(first.cells & second.cells) / min(len(first.cells), len(second.cells))
             pieces = shared > _PIECES and not touch[i, j] and _at_one_height(first, second)
             inward = max(_inward(first, second), _inward(second, first))
@@ -86,6 +89,7 @@ def _standing(mask: NDArray[np.bool_], plan: Array, height: Array, normals: Arra
     known = mask & np.isfinite(normals).all(axis=-1)
     return Standing(
         cells=frozenset((int(a), int(b)) for a, b in cells),
+        box=(cells.min(axis=0), cells.max(axis=0)),
         middle=(cells.mean(axis=0) + 0.5) * _CELL,
         plan=plan[known],
         normals=normals[known],
@@ -104,6 +108,13 @@ def _filled(cells: NDArray[np.int64]) -> NDArray[np.int64]:
         np.meshgrid(*(np.arange(a, b + 1) for a, b in zip(low, high, strict=True))), axis=-1
     ).reshape(-1, 2)
     return box[in_hull(hull, box.astype(np.float64), 1e-9)]
+
+
+def _apart(first: Standing, second: Standing) -> bool:
+    """Whether table lies between two footprints, as their bounding boxes tell."""
+    return bool(
+        (first.box[0] > second.box[1] + 2).any() or (second.box[0] > first.box[1] + 2).any()
+    )
 
 
 def _gap(first: Standing, second: Standing) -> float:
