@@ -25,8 +25,12 @@ _PIECES = 0.25  # of the smaller footprint, shared by pieces of one thing
 
 @dataclass(frozen=True)
 class Standing:
-    """One part as it stands: its cells of the plan, their bounding box, their middle in metres, its points and normals there
-    (n, 2), and the heights between which nine tenths of it lie, metres."""
+    """One part as it stands.
+
+    cells : of the plan, in the hull of its footprint; box : the lowest and highest of them;
+    middle : theirs, metres; plan, normals : (n, 2) its points and their normals in the plan;
+    low, high : heights between which nine tenths of it lie, metres
+    """
 
     cells: frozenset[tuple[int, int]]
     box: tuple[NDArray[np.int64], NDArray[np.int64]]
