@@ -13,9 +13,9 @@ from brrp_cli.frames.table import convex_hull, in_hull
 Array = NDArray[np.float64]
 
 _CELL = 0.003
-# Mean cosine to the middle, of an inside that has a good part of the footprint and of any: the
-# inside of a round wall has 0.7 and more.
-_INWARD, _ALL_INWARD = 0.3, 0.65
+# Mean cosine to the middle: of an inside that shares the footprint, and of walls of which one is
+# seen from within and one from without (of a round one 0.9).
+_INWARD, _FACING = 0.3, 0.7
 _ROUND = 0.35  # of both footprints, that the hull around them may hold besides
 _ABOVE = 0.02  # metres by which an inside may rise over its outside
 _SAME_RANGE = 0.3
@@ -81,9 +81,7 @@ def join_on_one_spot(
             pieces = shared > _PIECES and not touch[i, j] and _at_one_height(first, second)
             inward = max(_inward(first, second), _inward(second, first))
             inside = inward > _INWARD and shared > overlap
-            # The near wall of a mug, and the far one, which completes its round.
-            round_off = inward > _ALL_INWARD and _gap(first, second) < _ROUND
-            same[i, j] = pieces or inside or round_off
+            same[i, j] = pieces or inside or _walls(first, second) or _walls(second, first)
     return relabel(parts, same)
 
 
@@ -139,6 +137,17 @@ def _inward(inner: Standing, outer: Standing) -> float:
     # A floor faces neither way, and counts neither way.
     steepness = np.linalg.norm(inner.normals, axis=-1).sum()
     return float(facing.sum() / max(steepness, 1e-9))
+
+
+def _walls(far: Standing, near: Standing) -> bool:
+    """Whether two are the far wall of a round thing, seen from within, and its near wall, seen from
+    without: of one height, one facing the middle and one away, and round together."""
+    return (
+        abs(far.high - near.high) < _ABOVE
+        and _inward(far, near) > _FACING
+        and _inward(near, far) < -_FACING
+        and _gap(far, near) < _ROUND
+    )
 
 
 def _hangs(first: Standing, second: Standing) -> bool:
