@@ -15,11 +15,12 @@ Array = NDArray[np.float64]
 _CELL = 0.003
 # Mean cosine to the middle: of an inside that shares the footprint, and of walls of which one is
 # seen from within and one from without (of a round one 0.9).
-_INWARD, _FACING = 0.3, 0.7
+_INWARD, _FACING = 0.3, 0.5
 _ROUND = 0.35  # of both footprints, that the hull around them may hold besides
-_ABOVE = 0.02  # metres by which an inside may rise over its outside
+_ABOVE = 0.03  # metres by which an inside may rise over its outside
 _SAME_RANGE = 0.3
 _STANDS = 0.04  # metres; what is nowhere lower does not stand on the table
+_OVER = 0.4  # of the smaller footprint, shared by what hangs on something and that
 _PIECES = 0.25  # of the smaller footprint, shared by pieces of one thing
 
 
@@ -72,13 +73,13 @@ def join_on_one_spot(
         for j, second in standing.items():
             if j >= i:
                 continue
-            if touch[i, j] and _hangs(first, second):
-                same[i, j] = True
-                continue
             if _apart(first, second):
                 continue
             shared = len(first.cells & second.cells) / min(len(first.cells), len(second.cells))
-            pieces = shared > _PIECES and not touch[i, j] and _at_one_height(first, second)
+            if touch[i, j]:
+                pieces = shared > _OVER and _hangs(first, second)
+            else:
+                pieces = shared > _PIECES and _at_one_height(first, second)
             inward = max(_inward(first, second), _inward(second, first))
             inside = inward > _INWARD and shared > overlap
             same[i, j] = pieces or inside or _walls(first, second) or _walls(second, first)

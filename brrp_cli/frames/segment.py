@@ -46,7 +46,7 @@ class SegmentConfig:
     border: float = 0.45
     overlap: float = 0.3
     margin: float = 0.03
-    min_area: float = 0.0006
+    min_area: float = 0.0007
 
 
 def segment(frame: Frame, seed: int = 0, config: SegmentConfig | None = None) -> NDArray[np.int64]:
