@@ -13,6 +13,7 @@ Poses are in the world frame of the views' `T_world_cam`.
 from __future__ import annotations
 
 import logging
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TypeVar
@@ -114,7 +115,7 @@ def find_scenes(folder: Path, select: slice | None = None) -> list[Scene]:
         from brrp_cli.evaluation.bop_scenes import bop_scenes
 
         if found := bop_scenes(folder):
-            return list(_chosen(found, select, folder))
+            return [*_chosen(found, select, folder)]
     if not paths:
         raise SceneError(
             "No scene found",
@@ -127,8 +128,8 @@ def find_scenes(folder: Path, select: slice | None = None) -> list[Scene]:
     return [_read_scene(path) for path in _chosen(paths, select, folder)]
 
 
-def _chosen(items: list[T], select: slice | None, folder: Path) -> list[T]:
-    chosen = items[select or slice(None)]
+def _chosen(items: Sequence[T], select: slice | None, folder: Path) -> list[T]:
+    chosen = list(items[select or slice(None)])
     if not chosen and select is not None:
         raise SceneError(
             "The selection holds no scene",

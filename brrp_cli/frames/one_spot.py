@@ -15,9 +15,9 @@ Array = NDArray[np.float64]
 _CELL = 0.003
 # Mean cosine to the middle: of an inside that shares the footprint, and of walls of which one is
 # seen from within and one from without (of a round one 0.9).
-_INWARD, _FACING = 0.3, 0.5
+_INWARD, _FACING = 0.3, 0.7
 _ROUND = 0.35  # of both footprints, that the hull around them may hold besides
-_ABOVE = 0.03  # metres by which an inside may rise over its outside
+_ABOVE = 0.02  # metres by which an inside may rise over its outside
 _SAME_RANGE = 0.3
 _STANDS = 0.04  # metres; what is nowhere lower does not stand on the table
 _OVER = 0.4  # of the smaller footprint, shared by what hangs on something and that

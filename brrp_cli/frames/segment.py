@@ -108,7 +108,7 @@ def _lift(
 def _areas(segmap: NDArray[np.int64], frame: Frame) -> NDArray[np.float64]:
     """(n + 1,) what each label shows of itself, metres squared, as if seen face on."""
     area = np.nan_to_num(frame.points[..., 2] ** 2) / (frame.K[0, 0] * frame.K[1, 1])
-    return np.bincount(segmap.ravel(), weights=area.ravel())
+    return np.asarray(np.bincount(segmap.ravel(), weights=area.ravel()), dtype=np.float64)
 
 
 def _numbered(segmap: NDArray[np.int64], frame: Frame, min_area: float) -> NDArray[np.int64]:

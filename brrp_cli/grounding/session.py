@@ -67,7 +67,9 @@ class Session:
 
     def __call__(self, inputs: Mapping[str, NDArray[Any]]) -> list[NDArray[Any]]:
         """The outputs, in the order in which they were asked for. Errors: MaskError."""
-        fed = {name: value.astype(self._types[name]) for name, value in inputs.items()}
+        fed: dict[str, NDArray[Any]] = {
+            name: value.astype(self._types[name]) for name, value in inputs.items()
+        }
         try:
             return [np.asarray(out) for out in self._session.run(self._outputs, fed)]
         except Exception as error:
