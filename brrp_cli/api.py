@@ -9,13 +9,16 @@ from __future__ import annotations
 
 import logging
 import time
+from collections.abc import Callable
 from dataclasses import asdict, dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from brrp_cli.config import Config, PointSDFConfig, VPrismConfig, preset
 from brrp_cli.errors import BrrpError, PriorError, WeightsError
 from brrp_cli.files import sha256_file
+from brrp_cli.finite import check_object
 from brrp_cli.frames.frame import BACKGROUND, Frame
 from brrp_cli.frames.observe import ObjectObservation, observe
 from brrp_cli.frames.plane import Plane
@@ -24,6 +27,7 @@ from brrp_cli.methods.check_prior import check_prior
 from brrp_cli.methods.registry import METHODS, RECONSTRUCTING
 from brrp_cli.prior.store import Prior
 from brrp_cli.progress import progress
+from brrp_cli.retrieval.checked import CheckedRetriever
 
 if TYPE_CHECKING:
     from brrp_cli.retrieval.base import Retriever
@@ -113,7 +117,9 @@ def reconstruct(
     device = pick_device(device)
     seconds: dict[str, float] = {}
     start = time.perf_counter()
-    retriever = retriever or choose_retriever("auto", prior, config, seed)
+    retriever = CheckedRetriever(
+        retriever or choose_retriever("auto", prior, config, seed), len(prior.names)
+    )
     seconds["retriever"] = time.perf_counter() - start
     start = time.perf_counter()
     scene = observe(frame, config.observation, seed)
@@ -133,16 +139,7 @@ def reconstruct(
         if object_id in scene.too_few:
             objects.append(_too_few(object_id, scene.too_few[object_id], config))
             continue
-        try:
-            result = one(scene.objects[object_id])
-            _add_surface(result, config)
-        except PriorError:
-            # A damaged prior is no fault of the object that comes upon it.
-            raise
-        except BrrpError as error:
-            log.warning("Object %d: %s", object_id, error)
-            result = ObjectReconstruction(object_id, FAILED, str(error))
-        objects.append(result)
+        objects.append(_whole(object_id, partial(one, scene.objects[object_id]), config))
     return Reconstruction(
         frame=frame,
         objects=objects,
@@ -188,10 +185,12 @@ def _vprism(frame: Frame, config: Config, seed: int) -> Reconstruction:
     start = time.perf_counter()
     scene = sample_scene(frame, own.observation, seed)
     seconds = {"observation": time.perf_counter() - start}
-    objects = reconstruct_scene(scene, own, seed)
     surface = replace(config.surface, level=METHODS["vprism"].level(config))
-    for item in progress(objects, "surfaces"):
-        _add_surface(item, replace(config, surface=surface))
+    asked = replace(config, surface=surface)
+    objects = [
+        _whole(item.object_id, partial(_itself, item), asked)
+        for item in progress(reconstruct_scene(scene, own, seed), "surfaces")
+    ]
     return Reconstruction(
         frame=frame,
         objects=objects,
@@ -220,9 +219,13 @@ def _pointsdf(
     own = PointSDFConfig()
     loaded = load_weights(weights)
     surface = replace(config.surface, level=own.level)
-    objects = reconstruct_pointsdf(frame, loaded.network.to(device), own)
-    for item in progress(objects, "surfaces"):
-        _add_surface(item, replace(config, surface=surface))
+    asked = replace(config, surface=surface)
+    objects = [
+        _whole(item.object_id, partial(_itself, item), asked)
+        for item in progress(
+            reconstruct_pointsdf(frame, loaded.network.to(device), own), "surfaces"
+        )
+    ]
     # The network asks for no table; the picture does, to show the scene upright.
     background = frame.points[frame.valid & (frame.segmap == BACKGROUND)]
     seen = frame.points[frame.valid & (frame.segmap != BACKGROUND)]
@@ -254,6 +257,35 @@ def _pointsdf(
 def _too_few(object_id: int, count: int, config: Config) -> ObjectReconstruction:
     message = f"{count} valid depth points, {config.observation.min_points} are needed"
     return ObjectReconstruction(object_id, TOO_FEW_POINTS, message, n_points=count)
+
+
+def _itself(item: ObjectReconstruction) -> ObjectReconstruction:
+    return item
+
+
+def _whole(
+    object_id: int, infer: Callable[[], ObjectReconstruction], config: Config
+) -> ObjectReconstruction:
+    """The object with its surface, or with the status of having failed: whatever goes wrong with
+    one object is no matter of the others."""
+    try:
+        result = infer()
+        check_object(result)
+        _add_surface(result, config)
+    except PriorError:
+        # A damaged prior is no fault of the object that comes upon it.
+        raise
+    except BrrpError as error:
+        log.warning("Object %d: %s", object_id, error)
+        return ObjectReconstruction(object_id, FAILED, str(error))
+    except Exception as error:
+        # A library stumbled: Open3D, SciPy and torch do, over shapes that nobody thought of.
+        log.warning("Object %d: an error that brrp does not know: %r", object_id, error)
+        log.debug("Object %d", object_id, exc_info=True)
+        return ObjectReconstruction(
+            object_id, FAILED, f"an error that brrp does not know: {error!r}"
+        )
+    return result
 
 
 def _add_surface(result: ObjectReconstruction, config: Config) -> None:

@@ -9,6 +9,7 @@ import sys
 import click
 
 from brrp_cli.errors import BrrpError
+from brrp_cli.stop import sigterm_raises, stopped
 from brrp_cli.version import __version__
 
 # command -> (module, one line for `brrp --help`), so that help needs no import of a command.
@@ -19,6 +20,8 @@ COMMANDS = {
     "frame": ("frame", "Turn colour and depth images into a frame; find the objects."),
     "segment": ("segment", "Make masks, show them, and correct them by id."),
     "reconstruct": ("reconstruct", "Turn an RGBD frame into a closed mesh per object."),
+    "view": ("view", "Look at results in one HTML page, offline."),
+    "export": ("export", "Turn results into collision shapes: URDF, MJCF, a cuRobo world."),
     "fetch": ("fetch", "Bring CLIP, or the models that make masks by a prompt."),
     "eval": ("eval", "Measure methods on scenes whose truth is known."),
     "demo": ("demo", "Run the whole path on a made scene and score it."),
@@ -46,12 +49,16 @@ class LazyGroup(click.Group):
             formatter.write_dl([(name, text) for name, (_, text) in COMMANDS.items()])
 
     def invoke(self, ctx: click.Context) -> object:
-        """Run; a BrrpError becomes one message on stderr and its exit code."""
+        """Run; a BrrpError becomes one message on stderr and its exit code, and so does a stop."""
         try:
-            return super().invoke(ctx)
+            with sigterm_raises():
+                return super().invoke(ctx)
         except BrrpError as error:
-            click.echo(f"Error: {error}", err=True)
-            sys.exit(error.exit_code)
+            failure = error
+        except KeyboardInterrupt as stop:
+            failure = stopped(stop, found="nothing is half written")
+        click.echo(f"Error: {failure}", err=True)
+        sys.exit(failure.exit_code)
 
 
 @click.group(cls=LazyGroup, context_settings={"help_option_names": ["-h", "--help"]})

@@ -25,6 +25,8 @@ _FIXES = {
     "libOpenGL": _SYSTEM_PACKAGES,
     "libgomp": _SYSTEM_PACKAGES,
 }
+# Packages that are not called what they are imported as.
+_PACKAGES = {"rerun": "rerun-sdk"}
 # Without libOpenGL pymeshlab imports, prints a page of warnings and lacks half of its filters.
 _NEEDS = {"pymeshlab": ("libGL.so.1", "libOpenGL.so.0")} if sys.platform == "linux" else {}
 
@@ -37,9 +39,10 @@ def import_library(name: str) -> ModuleType:
         return importlib.import_module(name)
     except (ImportError, OSError) as error:
         found = str(error)
+        package = _PACKAGES.get(name, name.split(".")[0])
         fix = next(
             (text for library, text in _FIXES.items() if library in found),
-            f"pip install {name.split('.')[0]}, in the environment that runs brrp",
+            f"pip install {package}, in the environment that runs brrp",
         )
         raise DependencyError(f"{name} does not load", found=found, fix=fix) from error
 

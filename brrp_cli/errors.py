@@ -93,6 +93,10 @@ class FetchError(BrrpError):
     """A file cannot be fetched, or what came is not the file that was meant."""
 
 
+class ResultError(BrrpError):
+    """A folder of results cannot be used."""
+
+
 class OutputError(BrrpError):
     """Results cannot be written."""
 

@@ -2,15 +2,25 @@
 
 from __future__ import annotations
 
+import ctypes
+import errno
 import hashlib
+import json
 import os
 import shutil
 import tempfile
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
+from typing import Any
 
 from brrp_cli.errors import OutputError
+
+# What file systems without such a thing say.
+_NOT_SUPPORTED = {errno.EINVAL, errno.ENOSYS, errno.ENOTSUP}
+_RENAME_EXCHANGE = 2
+_DIGITS = 18
+_AT_FDCWD = -100
 
 
 def sha256_file(path: Path) -> str:
@@ -19,13 +29,46 @@ def sha256_file(path: Path) -> str:
         return hashlib.file_digest(stream, "sha256").hexdigest()
 
 
+def parse_json(text: str | bytes) -> Any:
+    """JSON from a file that may be anything. Errors: ValueError."""
+    try:
+        return json.loads(text, parse_int=_int64)
+    except RecursionError as error:
+        raise ValueError("brackets within brackets without an end") from error
+
+
+def _int64(digits: str) -> int:
+    """What no NumPy integer and no float can hold is no number of ours."""
+    if len(digits) > _DIGITS:
+        raise ValueError(f"an integer of {len(digits)} digits")
+    return int(digits)
+
+
 def fsync_folder(folder: Path) -> None:
-    """Make renames inside `folder` durable."""
+    """Make renames inside `folder` durable, where the file system can do that."""
     descriptor = os.open(folder, os.O_RDONLY)
     try:
         os.fsync(descriptor)
+    except OSError as error:
+        if error.errno not in _NOT_SUPPORTED:
+            raise
     finally:
         os.close(descriptor)
+
+
+def exchange(first: Path, second: Path) -> None:
+    """Swap two names of one file system, so that neither is ever without a file.
+
+    Errors: OSError, with an errno of "not supported" where the system cannot do it in one step.
+    """
+    try:
+        rename = ctypes.CDLL(None, use_errno=True).renameat2
+    except AttributeError:
+        raise OSError(errno.ENOSYS, os.strerror(errno.ENOSYS)) from None
+    names = os.fsencode(first), os.fsencode(second)
+    if rename(_AT_FDCWD, names[0], _AT_FDCWD, names[1], _RENAME_EXCHANGE) != 0:
+        number = ctypes.get_errno()
+        raise OSError(number, os.strerror(number), str(first), None, str(second))
 
 
 def cannot_write(path: Path, error: OSError) -> OutputError:
@@ -63,7 +106,8 @@ def atomic_path(path: Path) -> Iterator[Path]:
     except OSError as error:
         raise cannot_write(path, error) from error
     finally:
-        partial.unlink(missing_ok=True)
+        with suppress(OSError):
+            partial.unlink(missing_ok=True)
 
 
 def write_bytes(path: Path, data: bytes) -> None:
@@ -127,15 +171,9 @@ def atomic_folder(folder: Path, *, overwrite: bool, mark: str) -> Iterator[Path]
         raise cannot_write(folder, error) from error
     try:
         yield partial
-        for path in partial.rglob("*"):
-            if path.is_file():
-                with path.open("rb") as stream:
-                    os.fsync(stream.fileno())
+        _fsync_tree(partial)
         if folder.exists():
-            replaced = partial.with_name(partial.name + ".replaced")
-            folder.rename(replaced)
-            partial.rename(folder)
-            shutil.rmtree(replaced)
+            _take_the_place(partial, folder)
         else:
             partial.rename(folder)
         fsync_folder(folder.parent)
@@ -143,3 +181,30 @@ def atomic_folder(folder: Path, *, overwrite: bool, mark: str) -> Iterator[Path]
         raise cannot_write(folder, error) from error
     finally:
         shutil.rmtree(partial, ignore_errors=True)
+
+
+def _fsync_tree(folder: Path) -> None:
+    for path in [*folder.rglob("*"), folder]:
+        if path.is_dir():
+            fsync_folder(path)
+        else:
+            with path.open("rb") as stream:
+                os.fsync(stream.fileno())
+
+
+def _take_the_place(partial: Path, folder: Path) -> None:
+    """`partial` becomes `folder`, whose old content is what `partial` holds then or is gone."""
+    try:
+        exchange(partial, folder)
+    except OSError as error:
+        if error.errno not in _NOT_SUPPORTED:
+            raise
+        # Not in one step: a kill between the two leaves both, whole, beside the place.
+        replaced = partial.with_name(partial.name + ".replaced")
+        folder.rename(replaced)
+        try:
+            partial.rename(folder)
+        except OSError:
+            replaced.rename(folder)
+            raise
+        shutil.rmtree(replaced, ignore_errors=True)

@@ -1,8 +1,13 @@
+import errno
 import os
+import shutil
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
+from file_faults import Steps, fail_at, in_a_process, kill_at, watched
 
+from brrp_cli import files
 from brrp_cli.errors import OutputError
 from brrp_cli.files import atomic_folder, atomic_path, sha256_file, write_bytes
 
@@ -170,3 +175,94 @@ def test_results_of_another_user_group_are_readable(tmp_path: Path) -> None:
     finally:
         os.umask(previous)
     assert (tmp_path / "a").stat().st_mode & 0o044 == 0o044
+
+
+def result_folder(out: Path, text: str) -> None:
+    """Results as a command writes them: several files, over what was there."""
+    with atomic_folder(out, overwrite=True, mark=MARK) as partial:
+        (partial / MARK).write_bytes(text.encode())
+        (partial / "meshes").mkdir()
+        for i in range(3):
+            (partial / "meshes" / f"{i}.ply").write_bytes(1000 * text.encode())
+
+
+def whole_result(out: Path, text: str) -> bool:
+    wanted = {MARK, *(f"meshes/{i}.ply" for i in range(3))}
+    found = {path.relative_to(out).as_posix(): path.read_text() for path in files_of(out)}
+    return found.keys() == wanted and all(t in (text, 1000 * text) for t in found.values())
+
+
+def files_of(folder: Path) -> list[Path]:
+    return [path for path in folder.rglob("*") if path.is_file()]
+
+
+@pytest.mark.parametrize("over", [False, True], ids=["new", "over others"])
+def test_results_are_whole_or_not_there_wherever_the_process_is_killed(
+    over: bool, tmp_path: Path
+) -> None:
+    out = tmp_path / "here" / "out"
+    steps = Steps(tmp_path)
+    with watched(steps):
+        result_folder(out, "new")
+    assert len(steps.done) >= 18
+    for number in range(len(steps.done)):
+        shutil.rmtree(tmp_path / "here", ignore_errors=True)
+        if over:
+            result_folder(out, "old")
+
+        def work(number: int = number) -> None:
+            with watched(Steps(tmp_path, kill_at(number))):
+                result_folder(out, "new")
+
+        assert in_a_process(work) in (0, -9)
+        if over:
+            assert whole_result(out, "old") or whole_result(out, "new"), steps.done[number]
+        else:
+            assert not out.exists() or whole_result(out, "new")
+        result_folder(out, "new")
+        assert whole_result(out, "new")
+
+
+@pytest.mark.parametrize("over", [False, True], ids=["new", "over others"])
+def test_results_are_whole_or_not_there_wherever_a_step_fails(over: bool, tmp_path: Path) -> None:
+    out = tmp_path / "here" / "out"
+    steps = Steps(tmp_path)
+    with watched(steps):
+        result_folder(out, "new")
+    for number in range(len(steps.done)):
+        shutil.rmtree(tmp_path / "here", ignore_errors=True)
+        if over:
+            result_folder(out, "old")
+        with watched(Steps(tmp_path, fail_at(number))), suppress(OutputError, OSError):
+            result_folder(out, "new")
+        kept = whole_result(out, "old") if over else not out.exists()
+        assert kept or whole_result(out, "new"), steps.done[number]
+
+
+def test_where_two_names_cannot_be_exchanged_a_folder_is_replaced_in_two_steps(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def cannot(first: Path, second: Path) -> None:
+        raise OSError(errno.EINVAL, "no such thing on this file system")
+
+    monkeypatch.setattr(files, "exchange", cannot)
+    result_folder(tmp_path / "out", "old")
+    result_folder(tmp_path / "out", "new")
+    assert whole_result(tmp_path / "out", "new") and names(tmp_path) == ["out"]
+
+
+def test_names_are_exchanged_in_one_step(tmp_path: Path) -> None:
+    for name in "ab":
+        (tmp_path / name).mkdir()
+        (tmp_path / name / name).touch()
+    files.exchange(tmp_path / "a", tmp_path / "b")
+    assert names(tmp_path / "a") == ["b"] and names(tmp_path / "b") == ["a"]
+    with pytest.raises(OSError, match="No such file"):
+        files.exchange(tmp_path / "a", tmp_path / "none")
+
+
+@pytest.mark.parametrize("text", ["[" * 10**5, '{"a": 1' + "0" * 400 + "}", "{", ""])
+def test_json_of_any_kind_is_a_value_error(text: str) -> None:
+    with pytest.raises(ValueError, match=r"."):
+        files.parse_json(text)
+    assert files.parse_json('{"a": [1, -2.5, 999999999999999999]}')["a"][2] == 999999999999999999

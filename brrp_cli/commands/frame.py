@@ -47,7 +47,7 @@ def command(source: SourceOptions, segment: bool, seed: int, output: Path, overw
 
     frame = source.read()
     if makes_masks:
-        frame = source.make_masks(frame, seed)
+        frame = require_objects(source.make_masks(frame, seed))
         write_picture(frame, picture)
     elif not frame.object_ids and source.masks is None:
         raise FrameError(

@@ -10,12 +10,15 @@ from typing import TYPE_CHECKING
 import click
 from click.core import ParameterSource
 
+from brrp_cli.commands.export import CONFIDENCE, export
 from brrp_cli.commands.frame import refuse_existing
 from brrp_cli.commands.retriever_option import RetrieverName
 from brrp_cli.commands.source_options import SourceOptions, source_options
 from brrp_cli.commands.weights_option import check_weights
 from brrp_cli.config import PRESETS, preset
 from brrp_cli.methods.registry import METHODS, RECONSTRUCTING
+from brrp_cli.planning.options import PlanOptions
+from brrp_cli.planning.parts import HOW, check_available
 from brrp_cli.progress import note
 from brrp_cli.retrieval.choose import RETRIEVERS, choose_retriever
 from brrp_cli.retrieval.clip_files import CLIP_DIR_VARIABLE
@@ -28,6 +31,7 @@ if TYPE_CHECKING:
     from brrp_cli.retrieval.base import Retriever
 
 SOME_FAILED = 3
+NO_COLLISION = "none"
 # Options that mean nothing to a method without a prior.
 OF_A_PRIOR = ("prior_path", "preset_name", "k", "retriever", "clip_dir")
 
@@ -65,6 +69,18 @@ OF_A_PRIOR = ("prior_path", "preset_name", "k", "retriever", "clip_dir")
 @click.option("--frame", "coordinates", type=click.Choice(["camera", "world"]), default="camera")
 @click.option("--seed", type=int, default=0, show_default=True)
 @click.option("--device", type=click.Choice(["auto", "cpu", "cuda"]), default="auto")
+@click.option(
+    "--collision",
+    type=click.Choice([*HOW, NO_COLLISION]),
+    default=NO_COLLISION,
+    show_default=True,
+    help="Also what `brrp export` writes, into OUT/plan/.",
+)
+@click.option(
+    "--confidence",
+    type=CONFIDENCE,
+    help="With --collision: shapes inside which each object lies with this probability.",
+)
 @click.option("--overwrite", is_flag=True, help="Replace the output folder if it is there.")
 def command(
     source: SourceOptions,
@@ -79,13 +95,15 @@ def command(
     coordinates: str,
     seed: int,
     device: str,
+    collision: str,
+    confidence: float | None,
     overwrite: bool,
 ) -> None:
     """Turn an RGBD frame into a closed mesh for every object.
 
     SOURCE is a frame file or anything else that `brrp frame` reads; or name the images of one
-    frame. Where there are no masks they are made: by --prompt, else without a model. They are then
-    written beside the output, to look at and to correct with `brrp segment`.
+    frame. Where there are no masks they are made: by --prompt, else without a model. A picture of
+    them is written beside the output; `brrp segment OUT/frame.npz` corrects them.
 
     The prior is --prior, else BRRP_PRIOR, else the one in the user's data folder, else the
     starter prior; --method vprism and pointsdf have none. Meshes are in metres, in the camera frame
@@ -98,12 +116,15 @@ def command(
       brrp reconstruct frame.npz --prior prior/ --preset paper -o out/ --seed 1
       brrp reconstruct frame.npz --method vprism
       brrp reconstruct frame.npz --method pointsdf --weights prior.safetensors
+      brrp reconstruct frame.npz --collision coacd --confidence 0.95
     """
     from brrp_cli.api import reconstruct
     from brrp_cli.surface.results import check_output, write_results
+    from brrp_cli.surface.stored import open_result
 
     source.check()
     check_weights([method], [] if weights is None else [weights])
+    check_collision(collision, confidence)
     uses_prior = METHODS[method].uses_prior
     if not uses_prior:
         refuse_options(method, device)
@@ -139,6 +160,9 @@ def command(
         f"Wrote {done} of {len(result.objects)} objects, metres, {coordinates} frame: {output}/ "
         f"({meshes}posterior.h5, result.json, preview.png)"
     )
+    if done and collision != NO_COLLISION:
+        options = PlanOptions(collision, confidence, seed=seed)
+        export(open_result(output), None, options, overwrite=False)
     if done < len(result.objects):
         sys.exit(SOME_FAILED)
 
@@ -146,22 +170,30 @@ def command(
 def make_masks(
     source: SourceOptions, frame: Frame, output: Path, seed: int, *, overwrite: bool
 ) -> Frame:
-    """The frame with masks made on the way; they and it are written beside the output folder."""
+    """The frame with masks made on the way; a picture of them is written beside the output."""
     from brrp_cli.frames.build import require_objects
-    from brrp_cli.frames.npz import save_frame
     from brrp_cli.frames.picture import write_picture
 
     if source.masks is not None:
         return require_objects(frame)
-    file, picture = (output.with_name(output.name + end) for end in (".npz", ".masks.png"))
-    refuse_existing([file, picture], overwrite)
-    frame = source.make_masks(frame, seed)
+    picture = output.with_name(output.name + ".masks.png")
+    refuse_existing([picture], overwrite)
+    frame = require_objects(source.make_masks(frame, seed))
     write_picture(frame, picture)
-    save_frame(frame, file)
     how = f"the prompt {source.prompt!r}" if source.prompt else "what stands on the table"
     note(f"Masks: made on the way from {how}, {len(frame.object_ids)} objects: {picture}")
-    note(f"  to correct them: brrp segment {file} --merge 1,2 --split 3 --drop 4 -o NEW.npz")
+    note(
+        f"  to correct them: brrp segment {output / 'frame.npz'} --merge 1,2 --split 3 --drop 4"
+        " -o NEW.npz"
+    )
     return frame
+
+
+def check_collision(collision: str, confidence: float | None) -> None:
+    """UsageError for --confidence alone; DependencyError where a library is missing."""
+    if collision == NO_COLLISION and confidence is not None:
+        raise click.UsageError(f"--confidence is of collision shapes: add --collision {HOW[0]}")
+    check_available(collision)
 
 
 def refuse_options(method: str, device: str) -> None:

@@ -36,6 +36,7 @@ from brrp_cli.prior.store import Prior
 from brrp_cli.progress import progress
 from brrp_cli.retrieval.choose import USE_APPEARANCE, USE_CLIP, resolve_name
 from brrp_cli.retrieval.clip_files import clip_folder, need_clip_folder
+from brrp_cli.stop import stopped
 from brrp_cli.version import __version__
 
 
@@ -77,7 +78,8 @@ def evaluate(request: Request, say: Callable[[str], None] = lambda text: None) -
     """Run what was not run yet and write the report.
 
     Errors: SceneError, PriorError, RetrievalError, WeightsError or MeshError before the work
-    starts; OutputError if the folder holds a different run and `overwrite` is false.
+    starts; OutputError if the folder holds a different run and `overwrite` is false; StoppedError
+    after Ctrl-C or SIGTERM.
     """
     scenes = find_scenes(request.scenes, request.selection)
     opened = _prior(request)
@@ -116,11 +118,21 @@ def evaluate(request: Request, say: Callable[[str], None] = lambda text: None) -
         lost: dict[str, str] = {}
         todo = remaining(plan, log)
         work = run_remaining(plan, log, todo, workers)
-        for ended, error in progress(work, "true meshes, then scenes", len(todo)):
-            if error is not None and isinstance(ended, Scene):
-                lost[ended.name] = str(error)
-            if error is not None:
-                say(f"{ended.name}: {error}")
+        try:
+            for ended, error in progress(work, "true meshes, then scenes", len(todo)):
+                if error is not None and isinstance(ended, Scene):
+                    lost[ended.name] = str(error)
+                if error is not None:
+                    say(f"{ended.name}: {error}")
+        except KeyboardInterrupt as stop:
+            raise stopped(
+                stop,
+                where=request.output,
+                found="scenes and variants that were finished are kept",
+                fix="give the same command again to go on",
+            ) from None
+        finally:
+            work.close()
         rows = collect(plan, log, lost)
         about = {
             **parameters,

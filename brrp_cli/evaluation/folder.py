@@ -11,7 +11,7 @@ from typing import Any
 from filelock import FileLock, Timeout
 
 from brrp_cli.errors import OutputError
-from brrp_cli.files import check_writable, write_bytes
+from brrp_cli.files import check_writable, parse_json, write_bytes
 from brrp_cli.prior.parameters import differences
 
 ROWS, PARAMETERS, LOCK = "rows.jsonl", "run.json", ".lock"
@@ -60,7 +60,7 @@ def _refuse_other(folder: Path, table: Mapping[str, Any]) -> None:
             )
         return
     try:
-        before = dict(json.loads(path.read_bytes()))
+        before = dict(parse_json(path.read_bytes()))
     except (OSError, ValueError, TypeError) as error:
         raise OutputError(
             "Cannot tell which run the folder holds",

@@ -56,7 +56,7 @@ def iou_against_k(summaries: Sequence[VariantSummary]) -> Any | None:
     for summary in summaries:
         v = summary.variant
         if v.k is not None:
-            key = Variant(v.method, v.preset, None, v.retriever, v.shift)
+            key = Variant(v.method, v.preset, None, v.retriever, shift=v.shift)
             lines.setdefault(key, []).append(summary)
     lines = {key: found for key, found in lines.items() if len(found) > 1}
     if not lines:

@@ -13,17 +13,17 @@ import math
 import os
 from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 from filelock import FileLock
 
 from brrp_cli.evaluation.score_object import PROBABILITY_METRICS, REGIONS, SHAPE_METRICS
 from brrp_cli.evaluation.variants import Variant
-from brrp_cli.files import cannot_write, write_bytes
+from brrp_cli.files import cannot_write, parse_json, write_bytes
 
 Row = dict[str, Any]
 
-VARIANT = ("method", "preset", "k", "retriever", "shift", "weights")
+VARIANT = ("method", "preset", "k", "retriever", "weights", "shift")
 OBJECT = ("scene", "view", "object_id", "name", "visible_pixels", "objects_in_view")
 METRICS = (
     *SHAPE_METRICS,
@@ -46,6 +46,7 @@ RESULT = (
 STAGES = ("observation", "retrieval", "registration", "inference", "surface")
 COST = (*(f"seconds_{stage}" for stage in STAGES), "seconds_total", "peak_memory_mb")
 COLUMNS = (*OBJECT, *VARIANT, *RESULT, *COST)
+_NEEDED = ("scene", "object_id", "objects_in_view")
 
 
 class RowLog:
@@ -58,7 +59,10 @@ class RowLog:
         """Add rows, together, from any process. Errors: OutputError."""
         text = "".join(json.dumps(_plain(row)) + "\n" for row in rows)
         try:
-            with FileLock(self.path.with_name(".rows.lock")), self.path.open("ab") as stream:
+            with FileLock(self.path.with_name(".rows.lock")), self.path.open("a+b") as stream:
+                # A full disk, or a kill, may have left a line without its end: `read` did not count
+                # it, so that its row is here again.
+                _drop_unfinished(stream)
                 stream.write(text.encode())
                 stream.flush()
                 os.fsync(stream.fileno())
@@ -71,11 +75,28 @@ class RowLog:
             return []
         lines = self.path.read_bytes().split(b"\n")
         # What follows the last newline was never finished.
-        return [_restored(json.loads(line)) for line in lines[:-1] if line.strip()]
+        rows = [_row(line) for line in lines[:-1]]
+        return [_restored(row) for row in rows if row is not None]
 
     def replace(self, rows: Iterable[Row]) -> None:
         """Keep these rows alone."""
         write_bytes(self.path, "".join(json.dumps(_plain(r)) + "\n" for r in rows).encode())
+
+
+def _drop_unfinished(stream: BinaryIO) -> None:
+    """Cut what follows the last newline."""
+    stream.seek(0)
+    stream.truncate(stream.read().rfind(b"\n") + 1)
+
+
+def _row(line: bytes) -> Row | None:
+    """None for a line that was cut."""
+    try:
+        row = parse_json(line)
+    except ValueError:
+        return None
+    whole = isinstance(row, dict) and row.keys() >= {*VARIANT, *_NEEDED}
+    return row if whole else None
 
 
 def variant_of(row: Mapping[str, Any]) -> Variant:

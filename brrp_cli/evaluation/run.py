@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Generator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -51,7 +51,7 @@ def remaining(plan: Plan, log: RowLog) -> Remaining:
 
 def run_remaining(
     plan: Plan, log: RowLog, todo: Remaining, workers: int
-) -> Iterator[tuple[TrueObject | Scene, BrrpError | None]]:
+) -> Generator[tuple[TrueObject | Scene, BrrpError | None], None, None]:
     """Do it: meshes first. Yields what has ended, with its error: a mesh that cannot be closed, a
     scene whose worker died. Errors: the first mesh's, if not one of them can be closed.
     """

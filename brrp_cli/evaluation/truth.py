@@ -7,7 +7,6 @@ that the caller names, since data sets travel apart from their meshes.
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -16,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brrp_cli.errors import SceneError
+from brrp_cli.files import parse_json
 from brrp_cli.geometry import similarity, transform_points
 
 
@@ -49,7 +49,7 @@ def read_objects(path: Path) -> list[TrueObject]:
     Errors: SceneError with the entry and the key that is missing or of the wrong kind.
     """
     try:
-        entries = json.loads(path.read_bytes())
+        entries = parse_json(path.read_bytes())
     except (OSError, ValueError) as error:
         raise SceneError("Cannot read the true objects", where=path, found=error) from error
     if not isinstance(entries, list):

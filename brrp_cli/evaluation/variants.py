@@ -20,15 +20,15 @@ class Variant:
     """One way to run. `preset`, `k` and `retriever` are None where a method has no prior, `weights`
     where it was not trained.
 
-    shift : pixels by which the masks are moved to the right; weights : name of what was trained
+    weights : name of what was trained; shift : pixels by which the masks are moved to the right
     """
 
     method: str
     preset: str | None = None
     k: int | None = None
     retriever: str | None = None
-    shift: int = 0
     weights: str | None = None
+    shift: int = 0
 
     @property
     def label(self) -> str:
@@ -96,7 +96,7 @@ def expand(
             found.append(Variant(method, shift=shift))
             continue
         found += [
-            Variant(method, name, k, retriever, shift)
+            Variant(method, name, k, retriever, shift=shift)
             for name, retriever in product(presets, retrievers)
             for k in (ks or [preset(name).k])
         ]

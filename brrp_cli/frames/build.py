@@ -19,6 +19,8 @@ log = logging.getLogger(__name__)
 MAX_PIXELS = 2**24
 FARTHEST_MEDIAN = 20.0  # metres; nobody reconstructs a table from further away
 NEAREST_MEDIAN = 0.01
+FARTHEST = 100.0  # metres; single values beyond it are a sensor's or a format's, not a place
+MAX_OBJECTS = 1000
 _GREY = 128
 
 
@@ -130,6 +132,13 @@ def _points_metres(raw: NDArray[Any], scale: float | None, source: Path | None) 
     _numbers(raw, "xyz", source)
     points = _scaled(raw, raw[..., 2], "xyz", scale, source)
     points[~(np.isfinite(points).all(axis=-1) & (points[..., 2] > 0))] = np.nan
+    if not np.isfinite(points).any():
+        raise FrameError(
+            "xyz has no valid pixel",
+            where=source,
+            expected="some points with x, y and z",
+            found="NaN or inf in each of them",
+        )
     return points
 
 
@@ -172,7 +181,17 @@ def _scaled(
             " millimetres, 0.0002 for TUM's 5000 to the metre",
         )
     with np.errstate(over="ignore", invalid="ignore"):
-        return (raw.astype(np.float64) * factor).astype(np.float32)
+        metres = (raw.astype(np.float64) * factor).astype(np.float32)
+        beyond = np.asarray(np.abs(metres).reshape(*raw_z.shape, -1) > FARTHEST).any(axis=-1)
+    if (beyond & valid).any():
+        log.warning(
+            "%s: %d pixels lie beyond %g m and count as no return",
+            source or "The frame",
+            np.count_nonzero(beyond & valid),
+            FARTHEST,
+        )
+    metres[beyond] = np.nan
+    return metres
 
 
 def _colour(rgb: ArrayLike, source: Path | None) -> NDArray[np.uint8]:
@@ -202,4 +221,14 @@ def _masks(segmap: ArrayLike, source: Path | None) -> NDArray[np.int64]:
             expected="(H, W) whole numbers, 0 = background",
             found=f"shape {ids.shape}, dtype {ids.dtype}",
         )
-    return ids.astype(np.int64)
+    ids = ids.astype(np.int64)
+    objects = len(np.unique(ids))
+    if objects > MAX_OBJECTS:
+        raise FrameError(
+            "segmap holds too many objects",
+            where=source,
+            expected=f"at most {MAX_OBJECTS} different ids",
+            found=f"{objects}",
+            fix="check that it is the map of object ids, and not depth or colour",
+        )
+    return ids

@@ -17,6 +17,8 @@ log = logging.getLogger(__name__)
 # without which any cloud would pass for a tiny image.
 MAX_RESIDUAL = 2.0
 _MAX_SHARE = 0.02
+# Focal lengths, as shares of the image's size, of a fish-eye and of a telescope.
+_FOCAL = 0.05, 1000.0
 _EXPECTED_K = "[[fx, 0, cx], [0, fy, cy], [0, 0, 1]], pixels, fx and fy > 0"
 
 
@@ -42,8 +44,11 @@ def check_intrinsics(
     if not np.array_equal(K[2], [0, 0, 1]) or K[1, 0] != 0 or abs(K[0, 1]) > 1e-3 * K[0, 0]:
         raise refuse("K is no pinhole matrix without skew")
     height, width = shape
-    if max(K[0, 0] / width, K[1, 1] / height) < 0.05:
+    focal = K[0, 0] / width, K[1, 1] / height
+    if min(focal) < _FOCAL[0]:
         raise refuse("K is not in pixels", "multiply normalised intrinsics by the image's size")
+    if max(focal) > _FOCAL[1] or max(abs(K[0, 2]) / width, abs(K[1, 2]) / height) > _FOCAL[1]:
+        raise refuse("K is of no camera that sees this image")
     if not (0 <= K[0, 2] <= width and 0 <= K[1, 2] <= height):
         log.warning(
             "The principal point (%.1f, %.1f) lies outside the %d x %d image: is K of another"
@@ -97,10 +102,11 @@ def fit_intrinsics(
     K = np.eye(3)
     residuals = []
     for axis, pixel in enumerate((u, v)):
-        ratio = seen[:, axis] / seen[:, 2]
+        with np.errstate(over="ignore"):
+            ratio = seen[:, axis] / seen[:, 2]
         if given is not None:
             f, c = given[axis, axis], given[axis, 2]
-        elif np.ptp(pixel) < 2 or np.ptp(ratio) == 0:
+        elif np.ptp(pixel) < 2 or not 0 < np.ptp(ratio) < np.inf:
             f, c = np.nan, np.nan
         else:
             f, c = np.polyfit(ratio, pixel, 1)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import logging
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brrp_cli.errors import FrameError
+from brrp_cli.files import parse_json
 from brrp_cli.frames.arrays import check_file
 
 log = logging.getLogger(__name__)
@@ -94,7 +94,7 @@ def read_intrinsics(path: Path) -> Intrinsics:
     """
     check_file(path)
     try:
-        data = json.loads(path.read_text(encoding="utf-8"))
+        data = parse_json(path.read_text(encoding="utf-8"))
     except (ValueError, OSError) as error:
         raise FrameError(
             "The intrinsics are no JSON", where=path, expected=_EXPECTED, found=str(error)

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from PIL import Image, UnidentifiedImageError
+from PIL import Image
 
 from brrp_cli.errors import FrameError
 from brrp_cli.frames.arrays import check_file, read_npy
@@ -29,7 +29,10 @@ def _open(path: Path, mode: str | None) -> tuple[NDArray[Any], str]:
                     found=f"{image.width} x {image.height}",
                 )
             return np.asarray(image.convert(mode) if mode else image), image.mode
-    except (UnidentifiedImageError, OSError, SyntaxError, Image.DecompressionBombError) as error:
+    except FrameError:
+        raise
+    except Exception as error:
+        # Pillow's readers raise whatever the damaged file made them stumble over.
         raise FrameError(
             "The image cannot be read",
             where=path,

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brrp_cli.errors import FrameError
+from brrp_cli.files import parse_json
 from brrp_cli.frames.arrays import read_npy, read_npz
 from brrp_cli.frames.build import make_frame
 from brrp_cli.frames.frame import BACKGROUND, Frame
@@ -113,7 +113,7 @@ def _objects_only(ids: NDArray[Any], objects: Path) -> NDArray[Any]:
     if not objects.is_file():
         return np.where(ids < 0, BACKGROUND, ids)
     try:
-        listed = [int(entry["id"]) for entry in json.loads(objects.read_text(encoding="utf-8"))]
+        listed = [int(entry["id"]) for entry in parse_json(objects.read_text(encoding="utf-8"))]
     except (ValueError, KeyError, TypeError, OSError) as error:
         raise FrameError(
             "objects.json cannot be read",

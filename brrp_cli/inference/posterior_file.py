@@ -21,6 +21,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from brrp_cli.errors import BrrpError
+from brrp_cli.hdf5 import hdf5_bytes
 from brrp_cli.inference.hinge import HingeGrid
 from brrp_cli.inference.hypothesis_posterior import HypothesisPosterior
 from brrp_cli.inference.mean import MeanLattice
@@ -43,9 +44,8 @@ def save_posteriors(posteriors: Mapping[int, OccupancyPosterior], path: Path) ->
 
     V-PRISM's objects share the map of one frame, PointSDF's a decoder, which is written once.
     """
-    import h5py
 
-    with h5py.File(path, "w") as file:
+    def fill(file: h5py.File) -> None:
         file.attrs.update({"schema": SCHEMA, "frame": "camera", "units": "metre"})
         objects = file.create_group("objects")
         for object_id, posterior in posteriors.items():
@@ -65,6 +65,8 @@ def save_posteriors(posteriors: Mapping[int, OccupancyPosterior], path: Path) ->
                 _write_mean(group, posterior)
             else:
                 raise TypeError(f"no file format for {type(posterior).__name__}")
+
+    path.write_bytes(hdf5_bytes(fill))
 
 
 def _write(group: h5py.Group, posterior: HilbertPosterior) -> None:

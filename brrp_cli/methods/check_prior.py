@@ -16,7 +16,8 @@ def check_prior(prior: Prior, config: Config) -> None:
     distances are there if it asks for them."""
     # As JSON gives it back: tuples are lists.
     wanted = json.loads(json.dumps(asdict(config.features)))
-    lines = differences(prior.parameters["features"], wanted)
+    features = prior.parameters.get("features")
+    lines = differences(features if isinstance(features, dict) else {}, wanted)
     if lines:
         raise PriorError(
             "The prior's features are not those of the configuration",

@@ -28,6 +28,7 @@ from brrp_cli.pointsdf.weights import save_weights
 from brrp_cli.seeds import child_rng, child_seed
 
 LEVEL = 0.3
+SETTLING = 32  # batches
 CHECKPOINT, HISTORY = "checkpoint.pt", "history.json"
 
 
@@ -110,12 +111,13 @@ class Training:
                 if not go_on():
                     self.save()
                     return False
-                loss = self._step(train, batches[step], step)
+                loss = self.step(train, batches[step], step)
                 state.losses.append(loss)
                 state.step += 1
                 stepped(loss)
                 if state.step % every == 0:
                     self.save()
+            self.settle(train, batches[:SETTLING])
             record = {
                 "epoch": state.epoch + 1,
                 "train_loss": float(np.mean(state.losses)),
@@ -184,22 +186,34 @@ class Training:
             )
         )
 
+    def settle(self, train: Examples, batches: list[NDArray[np.int64]]) -> None:
+        """Batch normalisation's statistics anew, as the means over these batches: the running ones
+        lag behind weights that still move, which cost half of the accuracy in a short training.
+        Training itself never reads them.
+        """
+        layers = [m for m in self.network.modules() if isinstance(m, torch.nn.BatchNorm1d)]
+        for layer in layers:
+            layer.reset_running_stats()
+            layer.momentum = None
+        self.network.train()
+        torch.manual_seed(child_seed(self.config.seed, "settle", self.progress.epoch))
+        with torch.no_grad():
+            for step, rows in enumerate(batches):
+                clouds, queries, _ = self._draw(train, rows, "settle", step)
+                self.network(clouds.to(self.device), queries.to(self.device))
+        for layer in layers:
+            layer.momentum = 0.1
+
     def batches(self, count: int, epoch: int) -> list[NDArray[np.int64]]:
         """All examples once, in an order of the epoch's own, as evenly as may be: no batch is
         smaller than it should be, since batch normalisation needs two examples."""
         order = child_rng(self.config.seed, "order", epoch).permutation(count)
         return np.array_split(order, max(1, count // self.config.batch))
 
-    def _step(self, train: Examples, rows: NDArray[np.int64], step: int) -> float:
-        names = (self.progress.epoch, step)
-        clouds, queries, labels = draw_batch(
-            train,
-            rows,
-            self.config.queries,
-            self.config.noise / self.network.config.scale,
-            child_rng(self.config.seed, "step", *names),
-        )
-        torch.manual_seed(child_seed(self.config.seed, "dropout", *names))
+    def step(self, train: Examples, rows: NDArray[np.int64], step: int) -> float:
+        """Step number `step` of this epoch, on these rows; gives its loss."""
+        clouds, queries, labels = self._draw(train, rows, "step", step)
+        torch.manual_seed(child_seed(self.config.seed, "dropout", self.progress.epoch, step))
         self.network.train()
         self.optimizer.zero_grad()
         half = self.config.precision == "bfloat16"
@@ -209,6 +223,17 @@ class Training:
         loss.backward()
         self.optimizer.step()
         return float(loss.detach())
+
+    def _draw(
+        self, train: Examples, rows: NDArray[np.int64], purpose: str, step: int
+    ) -> tuple[Tensor, Tensor, Tensor]:
+        return draw_batch(
+            train,
+            rows,
+            self.config.queries,
+            self.config.noise / self.network.config.scale,
+            child_rng(self.config.seed, purpose, self.progress.epoch, step),
+        )
 
 
 def draw_batch(

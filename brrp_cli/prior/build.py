@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import logging
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -10,8 +13,9 @@ from brrp_cli.errors import BrrpError, DependencyError, MeshError, PriorError
 from brrp_cli.files import sha256_file
 from brrp_cli.prior.descriptions import describe, read_descriptions
 from brrp_cli.prior.find import MeshSource, find_meshes
-from brrp_cli.prior.guard import only_builder, sigterm_is_ctrl_c
+from brrp_cli.prior.guard import only_builder
 from brrp_cli.prior.index import read_index
+from brrp_cli.prior.inputs import input_sha256
 from brrp_cli.prior.looks import open_looks
 from brrp_cli.prior.make import make_object
 from brrp_cli.prior.manifest import (
@@ -31,15 +35,12 @@ from brrp_cli.prior.shard import StoredObject, open_shard, read_stored, write_sh
 from brrp_cli.prior.sidecar import is_whole, sidecar_file, write_sidecar
 from brrp_cli.prior.stock import Finished, Stock, take_stock
 from brrp_cli.prior.workers import cpu_count, run_tasks
+from brrp_cli.stop import sigterm_raises, stopped
 
 # No mesh that ever gets done takes this long; pymeshlab can loop for ever on some.
 TIME_LIMIT = 900.0
 
-
-class BuildStoppedError(BrrpError):
-    """Ctrl-C or SIGTERM; what was finished is kept."""
-
-    exit_code = 130
+log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
@@ -69,18 +70,18 @@ def build_prior(
     The same meshes and parameters give the same bytes, however many workers run and however often
     the build was interrupted. Errors: MeshError when there are no meshes or all of them fail;
     PriorError when the prior there has other parameters (and not `overwrite`) or another build is
-    at work on it; BuildStoppedError; OutputError.
+    at work on it; StoppedError after Ctrl-C or SIGTERM, which keeps what is finished; OutputError.
     """
     table = (parameters or BuildParameters()).as_dict()
     sources = {source.name: source for source in find_meshes(meshes)}
     given = read_descriptions(descriptions) if descriptions else {}
     phrases = describe(sources, given)
-    with only_builder(out), sigterm_is_ctrl_c():
+    with _stop_told(out), sigterm_raises(), only_builder(out):
         before = _previous(out)
         if before is not None and not overwrite:
             refuse_differences(before.parameters, table, out)
         run = _Run(out, table, sources, take_stock(out, before, table))
-        run.hash_inputs(meshes)
+        run.hash_inputs()
         run.make(parameters or BuildParameters(), workers or cpu_count(), time_limit, progress)
         manifest = run.with_sidecar(run.manifest(phrases), before)
         if not manifest.objects:
@@ -104,6 +105,18 @@ def build_prior(
     )
 
 
+GO_ON = "run the same command again to go on"
+
+
+@contextmanager
+def _stop_told(out: Path) -> Iterator[None]:
+    """Ctrl-C or SIGTERM becomes a StoppedError, wherever it came."""
+    try:
+        yield
+    except KeyboardInterrupt as stop:
+        raise stopped(stop, where=out, found="what was finished is kept", fix=GO_ON) from None
+
+
 @dataclass
 class _Run:
     """What is known while a build goes on, by name of object."""
@@ -118,13 +131,15 @@ class _Run:
     waiting: dict[str, StoredObject] = field(default_factory=dict)
     done: dict[str, Finished] = field(default_factory=dict)
 
-    def hash_inputs(self, meshes: Path) -> None:
-        """sha256 of each mesh file; a file that cannot be read has failed."""
+    def hash_inputs(self) -> None:
+        """sha256 of what each object is made from; what cannot be read has failed."""
         for name, source in self.sources.items():
             try:
-                self.hashes[name] = sha256_file(source.path)
+                self.hashes[name] = input_sha256(source.path)
             except OSError as error:
                 self.failed[name] = f"The mesh file cannot be read: {error.strerror}"
+            except MeshError as error:
+                self.failed[name] = _reason(error, source)
 
     def make(
         self, parameters: BuildParameters, workers: int, time_limit: float, progress: bool
@@ -150,15 +165,15 @@ class _Run:
                 left[id(group)] -= 1
                 if not left[id(group)]:
                     self._write(group)
-        except KeyboardInterrupt:
+        except KeyboardInterrupt as stop:
             for group in groups:
                 if self.waiting.keys() & set(group):
                     self._write(group)
-            raise BuildStoppedError(
-                "Stopped",
+            raise stopped(
+                stop,
                 where=self.out,
                 found=f"{len(self.made)} of {len(todo)} objects made in this run; they are kept",
-                fix="run the same command again to go on",
+                fix=GO_ON,
             ) from None
         finally:
             results.close()
@@ -233,8 +248,15 @@ class _Run:
 
 
 def make_stored(source: MeshSource, sha256: str, parameters: BuildParameters) -> StoredObject:
-    """A worker's task: one mesh, as its shard holds it."""
-    return pack(make_object(source, parameters), sha256)
+    """A worker's task: one mesh, as its shard holds it. Errors: MeshError."""
+    made = pack(make_object(source, parameters), sha256)
+    if input_sha256(source.path) != sha256:
+        raise MeshError(
+            "The mesh changed while the prior was built",
+            where=source.path,
+            fix="run brrp build-prior again",
+        )
+    return made
 
 
 def _reason(error: BrrpError, source: MeshSource) -> str:
@@ -268,6 +290,14 @@ def _sweep(out: Path, manifest: Manifest) -> None:
         *out.glob(".appearance-*.partial.np[yz]"),
     ]:
         if path not in listed:
-            path.unlink(missing_ok=True)
+            _delete(path)
     for path in out.glob(".manifest.*.partial.*"):
+        _delete(path)
+
+
+def _delete(path: Path) -> None:
+    """The prior is whole without it: what cannot be deleted is a line of `brrp verify`."""
+    try:
         path.unlink(missing_ok=True)
+    except OSError as error:
+        log.warning("%s cannot be deleted: %s", path, error.strerror)

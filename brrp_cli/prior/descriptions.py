@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import json
 import re
 import tomllib
 from collections.abc import Iterable
@@ -11,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from brrp_cli.errors import PriorError
+from brrp_cli.files import parse_json
 
 YCB_MANIFEST = Path(__file__).parents[1] / "data_manifests" / "ycb.toml"
 
@@ -39,14 +39,14 @@ def read_descriptions(path: Path) -> dict[str, str]:
         if path.suffix.lower() == ".toml":
             table = tomllib.loads(text)
         elif path.suffix.lower() == ".json":
-            table = json.loads(text)
+            table = parse_json(text)
         elif path.suffix.lower() == ".csv":
             table = _read_csv(text)
         else:
             raise PriorError(
                 "Descriptions in an unknown format", where=path, expected=".toml, .json or .csv"
             )
-    except (OSError, ValueError) as error:
+    except (OSError, ValueError, csv.Error) as error:
         raise PriorError("Cannot read the descriptions", where=path, found=error) from error
     if isinstance(table, dict) and isinstance(table.get("descriptions"), dict):
         table = table["descriptions"]

@@ -18,9 +18,10 @@ from pathlib import Path
 from typing import Any
 
 from brrp_cli.errors import OutputError
-from brrp_cli.files import sha256_file, write_bytes
+from brrp_cli.files import parse_json, sha256_file, write_bytes
 from brrp_cli.prior.manifest import (
     FILE,
+    MAX_BYTES,
     Manifest,
     ShardEntry,
     check_files,
@@ -109,8 +110,10 @@ def _kept(folder: Path) -> Index | None:
         checksum, line, _ = (folder / INDEX_FILE).read_bytes().split(b"\n")
         if hashlib.sha256(line).hexdigest().encode() != checksum:
             return None
-        table = json.loads(line)
-        if table.pop("schema") != SCHEMA or table["digest"] != sha256_file(folder / FILE):
+        table = parse_json(line)
+        if table.pop("schema") != SCHEMA or (folder / FILE).stat().st_size > MAX_BYTES:
+            return None
+        if table["digest"] != sha256_file(folder / FILE):
             return None
         appearance = table.pop("appearance")
         shards = [ShardEntry(*row) for row in table.pop("shards")]
@@ -120,6 +123,16 @@ def _kept(folder: Path) -> Index | None:
             **table,
         )
         check_files(index.shards, index.appearance)
+        _check_columns(index)
     except (OSError, ValueError, KeyError, TypeError, AttributeError):
         return None
     return index
+
+
+def _check_columns(index: Index) -> None:
+    """ValueError unless the columns are of one length and lead to shards that are there."""
+    count = len(index.names)
+    if not count == len(index.descriptions) == len(index.shard_of):
+        raise ValueError("columns of different lengths")
+    if count and not 0 <= min(index.shard_of) <= max(index.shard_of) < len(index.shards):
+        raise ValueError("an object in a shard that is not there")

@@ -3,24 +3,36 @@
 Keys: kind, schema, parameters, objects (sorted by name; each with name, description, source,
 input_sha256, shard, half_extent, record), shards (file, sha256, bytes), appearance (file, sha256,
 bytes; see sidecar.py), failed (name, source, reason), libraries (versions that the objects were
-made with). Schema 1 had no appearance. No times and no absolute paths: the same seed and meshes
+made with), content_sha256 (of the file's bytes with zeros in its place; a manifest of an older brrp
+has none). Schema 1 had no appearance. No times and no absolute paths: the same seed and meshes
 give the same bytes.
 """
 
 from __future__ import annotations
 
+import hashlib
 import json
-from dataclasses import asdict, dataclass
+import re
+from dataclasses import asdict, astuple, dataclass
 from pathlib import Path
 from typing import Any
 
 from brrp_cli.errors import PriorError
-from brrp_cli.files import write_bytes
+from brrp_cli.files import parse_json, write_bytes
+from brrp_cli.prior.find import safe_name
 from brrp_cli.prior.plan import APPEARANCE_NAME, SHARD_NAME
 
 SCHEMA = 2
 KIND = "brrp-prior"
 FILE = "manifest.json"
+# 50,000 objects take 75 MB.
+MAX_BYTES = 2**30
+# A shard of 16 objects with a million samples each takes 300 MB.
+MAX_SHARD_BYTES = 2**31
+_NOTHING = 64 * "0"
+# Of the top level alone, as `as_bytes` sets it.
+_OWN_SUM = re.compile(rb'\n "content_sha256": "([0-9a-f]{64})"')
+_SHA256 = re.compile(r"[0-9a-f]{64}")
 
 
 class ForeignManifestError(PriorError):
@@ -81,7 +93,10 @@ class Manifest:
         }
         if self.appearance is not None:
             table["appearance"] = asdict(self.appearance)
-        return (json.dumps(table, indent=1, ensure_ascii=False, sort_keys=True) + "\n").encode()
+        table["content_sha256"] = _NOTHING
+        text = json.dumps(table, indent=1, ensure_ascii=False, sort_keys=True) + "\n"
+        key = '\n "content_sha256": "'
+        return text.replace(key + _NOTHING, key + _sum(text.encode()), 1).encode()
 
     @property
     def libraries(self) -> dict[str, list[str]]:
@@ -105,7 +120,8 @@ def read_manifest(folder: Path) -> Manifest:
 
 
 def read_bytes(folder: Path) -> bytes:
-    """The manifest's bytes. Errors: PriorError for a folder that is no prior or cannot be read."""
+    """The manifest's bytes. Errors: PriorError for a folder that is no prior, or a manifest that
+    cannot be read or is far too large."""
     path = folder / FILE
     if not path.is_file():
         raise PriorError(
@@ -115,15 +131,19 @@ def read_bytes(folder: Path) -> bytes:
             fix="make one: brrp build-prior MESHES/ -o PRIOR/",
         )
     try:
+        size = path.stat().st_size
+        if size > MAX_BYTES:
+            raise ValueError(f"{size} bytes, at most {MAX_BYTES} are read")
         return path.read_bytes()
-    except OSError as error:
+    except (OSError, ValueError) as error:
         raise _unusable(path, error) from error
 
 
 def parse_manifest(data: bytes, path: Path) -> Manifest:
     """The manifest with these bytes, checked; `path` is for messages. Errors: PriorError."""
     try:
-        table = json.loads(data.decode("utf-8"))
+        _check_sum(data)
+        table = parse_json(data.decode("utf-8"))
         _refuse_foreign(table, path)
         manifest = Manifest(
             parameters=dict(table["parameters"]),
@@ -132,11 +152,26 @@ def parse_manifest(data: bytes, path: Path) -> Manifest:
             failed=[Failure(**entry) for entry in table["failed"]],
             appearance=ShardEntry(**table["appearance"]) if "appearance" in table else None,
         )
+        _check_text(manifest)
         check_files(manifest.shards, manifest.appearance)
         _check_objects(manifest)
-    except (ValueError, KeyError, TypeError, AttributeError) as error:
+    except (ValueError, KeyError, TypeError, AttributeError, OverflowError) as error:
         raise _unusable(path, error) from error
     return manifest
+
+
+def _sum(data: bytes) -> str:
+    return hashlib.sha256(data).hexdigest()
+
+
+def _check_sum(data: bytes) -> None:
+    """ValueError if the manifest tells a sum of its own that it does not have."""
+    told = _OWN_SUM.search(data)
+    if told is None:
+        return
+    start, end = told.span(1)
+    if _sum(data[:start] + _NOTHING.encode() + data[end:]) != told[1].decode():
+        raise ValueError("bytes that do not have the manifest's own sha256")
 
 
 def _unusable(path: Path, error: Exception) -> PriorError:
@@ -173,6 +208,30 @@ def check_files(shards: list[ShardEntry], appearance: ShardEntry | None) -> None
             raise ValueError(f"a shard named {shard.file!r}")
     if appearance and not APPEARANCE_NAME.fullmatch(appearance.file):
         raise ValueError(f"a file of descriptors named {appearance.file!r}")
+    for entry in [*shards, *([appearance] if appearance else [])]:
+        if not _SHA256.fullmatch(entry.sha256):
+            raise ValueError(f"{entry.file} with the sum {entry.sha256!r}")
+        if type(entry.bytes) is not int or not 0 <= entry.bytes <= MAX_SHARD_BYTES:
+            raise ValueError(f"{entry.file} of {entry.bytes!r} bytes")
+
+
+def _check_text(manifest: Manifest) -> None:
+    """TypeError unless what is text is text, and records are tables; ValueError for a name that
+    would lead elsewhere in a shard or in a file system."""
+    for entry in manifest.objects:
+        texts = (entry.name, entry.description, entry.source, entry.input_sha256, entry.shard)
+        if not all(isinstance(text, str) for text in texts) or not isinstance(entry.record, dict):
+            raise TypeError(f"an object of other types: {entry.name!r}")
+        if safe_name(entry.name) != entry.name:
+            raise ValueError(f"an object named {entry.name!r}")
+        made_with = entry.record.get("made_with", {})
+        if not isinstance(made_with, dict) or not all(
+            isinstance(version, str) for version in made_with.values()
+        ):
+            raise TypeError(f"{entry.name} made with {made_with!r}")
+    for failure in manifest.failed:
+        if not all(isinstance(text, str) for text in astuple(failure)):
+            raise TypeError(f"a failure of other types: {failure.name!r}")
 
 
 def _check_objects(manifest: Manifest) -> None:

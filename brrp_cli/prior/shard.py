@@ -31,9 +31,11 @@ from __future__ import annotations
 
 import hashlib
 import json
+import math
+import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -44,16 +46,18 @@ from brrp_cli.appearance.colour import COLOUR_BINS
 from brrp_cli.appearance.descriptor import Appearance
 from brrp_cli.appearance.pairs import PAIR_BINS
 from brrp_cli.errors import PriorError
-from brrp_cli.files import atomic_path
+from brrp_cli.files import parse_json, write_bytes
+from brrp_cli.hdf5 import hdf5_bytes
+from brrp_cli.prior.chunks import check_chunks
 
 if TYPE_CHECKING:
     import h5py
 
 SCHEMA = 2
 KIND = "brrp-prior-shard"
-MAX_ROWS = 10_000_000
-MAX_VALUES = 33 * MAX_ROWS
 GZIP_LEVEL = 4
+# What one object may take in memory; one with a million samples takes 40 MB.
+MAX_OBJECT_BYTES = 2**28
 
 APPEARANCE = "appearance"
 DISTANCES = "distances"
@@ -92,10 +96,9 @@ class StoredObject:
 
 
 def write_shard(path: Path, objects: list[StoredObject], parameters: dict[str, Any]) -> None:
-    """Write a whole shard or none. The same objects give the same bytes."""
-    import h5py
+    """Write a whole shard or none. The same objects give the same bytes. Errors: OutputError."""
 
-    with atomic_path(path) as partial, h5py.File(partial, "w") as file:
+    def fill(file: h5py.File) -> None:
         file.attrs["kind"] = KIND
         file.attrs["schema"] = SCHEMA
         file.attrs["parameters"] = json.dumps(parameters, sort_keys=True)
@@ -116,6 +119,23 @@ def write_shard(path: Path, objects: list[StoredObject], parameters: dict[str, A
                     shuffle=True,
                     fletcher32=True,
                 )
+
+    write_bytes(path, hdf5_bytes(fill))
+
+
+# Whatever h5py and NumPy make of bytes that are no shard.
+_DAMAGE = (
+    OSError,
+    KeyError,
+    ValueError,
+    RuntimeError,
+    TypeError,
+    AttributeError,
+    IndexError,
+    OverflowError,
+    MemoryError,
+    zlib.error,
+)
 
 
 @contextmanager
@@ -143,7 +163,7 @@ def open_shard(path: Path) -> Iterator[h5py.File]:
                     fix="pip install --upgrade brrp-cli",
                 )
             yield file
-    except (OSError, KeyError, ValueError, RuntimeError, TypeError) as error:
+    except _DAMAGE as error:
         raise damaged(path, error) from error
 
 
@@ -166,18 +186,27 @@ def object_names(file: h5py.File) -> list[str]:
     return sorted(file["objects"])
 
 
+@dataclass
+class _Reading:
+    """Of one object: where, the lengths met so far by letter, and the bytes that they take."""
+
+    where: str
+    lengths: dict[str, int] = field(default_factory=dict)
+    bytes: int = 0
+
+
 def read_stored(file: h5py.File, name: str) -> StoredObject:
     """Read and check one object: links, shapes, types, checksums, finite values."""
     where = f"{file.filename}, {name}"
-    group = _hard(file["objects"], name, where)
+    reading = _Reading(where)
+    group = _hard(file, f"objects/{name}", where)
     arrays: dict[str, NDArray[Any]] = {}
-    lengths: dict[str, int] = {}
     # Schema 1 has neither. Where one was taken out later, the checksum tells.
     absent = tuple(f"{name}/" for name in (APPEARANCE, DISTANCES) if name not in group)
     for key, (dtype, shape) in ARRAYS.items():
         if not key.startswith(absent):
-            arrays[key] = _read_array(group, key, dtype, shape, lengths, where)
-    record = json.loads(group.attrs["record"])
+            arrays[key] = _read_array(group, key, dtype, shape, reading)
+    record = parse_json(group.attrs["record"])
     if _content_sha256(arrays, record) != group.attrs["content_sha256"]:
         raise damaged(where, "data that do not have the object's checksum")
     starts = arrays["cloud_starts"]
@@ -185,7 +214,7 @@ def read_stored(file: h5py.File, name: str) -> StoredObject:
         arrays[f"{DISTANCES}/spacing"][0] > 0 and min(arrays[f"{DISTANCES}/values"].shape) > 1
     ):
         raise damaged(where, "distances without a lattice")
-    if starts[0] != 0 or starts[-1] != lengths["p"] or (np.diff(starts) < 0).any():
+    if starts[0] != 0 or starts[-1] != reading.lengths["p"] or (np.diff(starts) < 0).any():
         raise damaged(where, "clouds that overlap")
     return StoredObject(name, str(group.attrs["input_sha256"]), arrays, record)
 
@@ -193,10 +222,10 @@ def read_stored(file: h5py.File, name: str) -> StoredObject:
 def read_appearance(file: h5py.File, name: str) -> Appearance:
     """Read one object's descriptors alone, with all checks but the checksum of the whole object."""
     where = f"{file.filename}, {name}"
-    group = _hard(file["objects"], name, where)
-    lengths: dict[str, int] = {}
+    reading = _Reading(where)
+    group = _hard(file, f"objects/{name}", where)
     arrays = {
-        key.removeprefix(f"{APPEARANCE}/"): _read_array(group, key, dtype, shape, lengths, where)
+        key.removeprefix(f"{APPEARANCE}/"): _read_array(group, key, dtype, shape, reading)
         for key, (dtype, shape) in ARRAYS.items()
         if key.startswith(f"{APPEARANCE}/")
     }
@@ -219,23 +248,25 @@ def _read_array(
     key: str,
     dtype: str,
     shape: tuple[int | str, ...],
-    lengths: dict[str, int],
-    where: str,
+    reading: _Reading,
 ) -> NDArray[Any]:
+    where = reading.where
     data = _hard(group, key, where)
     found = f"{key}: {data.dtype.str} {data.shape}"
     fits = data.dtype == np.dtype(dtype) and len(data.shape) == len(shape)
     fits = fits and not data.is_virtual and data.external is None and data.fletcher32
-    if not fits or max(data.shape) > MAX_ROWS or data.size > MAX_VALUES:
+    reading.bytes += math.prod(data.shape) * data.dtype.itemsize
+    if not fits or reading.bytes > MAX_OBJECT_BYTES:
         raise damaged(where, f"{found}, expected {dtype} {shape} with checksums")
     for length, symbol in zip(data.shape, shape, strict=True):
         if isinstance(symbol, str):
             symbol, more = (symbol[0], 1) if symbol.endswith("+1") else (symbol, 0)
-            expected = lengths.setdefault(symbol, length - more) + more
+            expected = reading.lengths.setdefault(symbol, length - more) + more
         else:
             expected = symbol
         if length != expected:
             raise damaged(where, f"{found}, expected {expected} for {symbol!r}")
+    check_chunks(data, f"{where}, {key}")
     array: NDArray[Any] = data[...]
     if not np.isfinite(array).all():
         raise damaged(where, f"{key}: values that are NaN or infinite")

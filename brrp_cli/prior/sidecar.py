@@ -26,6 +26,9 @@ from brrp_cli.files import atomic_path, sha256_file
 from brrp_cli.prior.manifest import Manifest, ObjectEntry, ShardEntry
 from brrp_cli.prior.shard import damaged, open_shard, read_appearance
 
+# Views, and poses, that anybody may ask for.
+_MOST = 10_000
+
 log = logging.getLogger(__name__)
 
 
@@ -40,13 +43,17 @@ def write_sidecar(
 ) -> ShardEntry:
     """Write the file of these objects, whole or not at all. Errors: PriorError, OutputError."""
     file = sidecar_file(objects, parameters)
-    with atomic_path(folder / file) as partial:
-        table = np.lib.format.open_memmap(
-            partial, mode="w+", dtype=row_type(parameters), shape=(len(objects),)
-        )
-        _fill(table, folder, objects)
-        table.flush()
-        del table
+    kind = row_type(parameters)
+    header = {
+        "descr": np.lib.format.dtype_to_descr(kind),
+        "fortran_order": False,
+        "shape": (len(objects),),
+    }
+    # Written, not mapped: on a full disk a map ends the process without a word.
+    with atomic_path(folder / file) as partial, partial.open("wb") as stream:
+        np.lib.format.write_array_header_1_0(stream, header)
+        for row in _rows(kind, folder, objects):
+            stream.write(row.tobytes())
     return ShardEntry(file, sha256_file(folder / file), (folder / file).stat().st_size)
 
 
@@ -90,9 +97,8 @@ def restore_sidecar(folder: Path, manifest: Manifest) -> NDArray[Any]:
     try:
         made = write_sidecar(folder, manifest.objects, manifest.parameters)
     except OutputError:
-        table = np.zeros(len(manifest.objects), row_type(manifest.parameters))
-        _fill(table, folder, manifest.objects)
-        return table
+        rows = _rows(row_type(manifest.parameters), folder, manifest.objects)
+        return np.stack(list(rows))
     if made != entry:
         raise damaged(path, "descriptors that are not those that the manifest vouches for")
     return read_sidecar(folder, entry, manifest.parameters, len(manifest.objects))
@@ -103,7 +109,9 @@ def row_type(parameters: dict[str, Any]) -> np.dtype[Any]:
     try:
         views = int(parameters["appearance"]["views"])
         poses = int(parameters["poses"]["max_count"])
-    except (KeyError, TypeError, ValueError) as error:
+        if not (0 < views <= _MOST and 0 < poses <= _MOST):
+            raise ValueError(f"{views} views, {poses} poses")
+    except (KeyError, TypeError, ValueError, OverflowError) as error:
         raise PriorError(
             "The prior's manifest does not say how its objects were looked at",
             found=repr(error),
@@ -118,12 +126,20 @@ def row_type(parameters: dict[str, Any]) -> np.dtype[Any]:
     )
 
 
-def _fill(table: NDArray[Any], folder: Path, objects: Sequence[ObjectEntry]) -> None:
-    for row, found in enumerate(_from_shards(folder, objects)):
-        table["colour"][row] = found.colour
-        table["pairs"][row] = found.pairs
-        table["sizes"][row] = np.nan
-        table["sizes"][row, : len(found.sizes)] = found.sizes
+def _rows(
+    kind: np.dtype[Any], folder: Path, objects: Sequence[ObjectEntry]
+) -> Iterator[NDArray[Any]]:
+    """A row () for each object."""
+    for found in _from_shards(folder, objects):
+        row = np.zeros((), kind)
+        poses = len(found.sizes)
+        if len(found.colour) != len(row["colour"]) or poses > len(row["sizes"]):
+            raise damaged(folder, "shards with more or fewer views than the manifest tells")
+        row["colour"] = found.colour
+        row["pairs"] = found.pairs
+        row["sizes"] = np.nan
+        row["sizes"][:poses] = found.sizes
+        yield row
 
 
 def _from_shards(folder: Path, objects: Sequence[ObjectEntry]) -> Iterator[Appearance]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import logging
 from collections import defaultdict
 from dataclasses import dataclass
@@ -10,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from brrp_cli.errors import PriorError
+from brrp_cli.files import parse_json
 from brrp_cli.prior.manifest import Manifest, ObjectEntry
 from brrp_cli.prior.shard import object_names, open_shard, read_stored
 from brrp_cli.prior.store import check_bytes
@@ -63,7 +63,7 @@ def take_stock(folder: Path, manifest: Manifest | None, parameters: dict[str, An
 
 def _unlisted(path: Path, file: str, parameters: dict[str, Any]) -> Stock:
     with open_shard(path) as shard:
-        if json.loads(shard.attrs["parameters"]) != parameters:
+        if parse_json(shard.attrs["parameters"]) != parameters:
             return {}
         found = [read_stored(shard, name) for name in object_names(shard)]
     return {(s.name, s.input_sha256): Finished(file, s.record) for s in found}

@@ -141,4 +141,8 @@ def _serve(pipe: Connection, function: Callable[..., Any]) -> None:
             result = error
         except Exception as error:
             result = BrrpError("An error that brrp does not know", found=repr(error))
-        pipe.send(result)
+        try:
+            pipe.send(result)
+        except ConnectionError:
+            # Whoever asked is gone.
+            return

@@ -8,7 +8,6 @@ probability 0; what is missing from 1 is the probability that the prior does not
 from __future__ import annotations
 
 import csv
-import json
 import math
 from collections.abc import Sequence
 from pathlib import Path
@@ -18,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brrp_cli.errors import RetrievalError
+from brrp_cli.files import parse_json
 from brrp_cli.frames.frame import Frame
 
 EXPECTED = 'JSON {"1": {"NAME": 0.9}, "2": {}}, or CSV with the columns object, name, probability'
@@ -54,9 +54,9 @@ class TableRetriever:
 def _read(path: Path) -> dict[int, dict[str, Any]]:
     try:
         text = path.read_text(encoding="utf-8")
-        table = _from_csv(text) if path.suffix.lower() == ".csv" else json.loads(text)
+        table = _from_csv(text) if path.suffix.lower() == ".csv" else parse_json(text)
         return {int(object_id): dict(given) for object_id, given in table.items()}
-    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
+    except (OSError, ValueError, KeyError, TypeError, AttributeError, csv.Error) as error:
         raise RetrievalError(
             "The table of probabilities cannot be read",
             where=path,

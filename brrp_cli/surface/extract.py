@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
 from brrp_cli.config import SurfaceConfig
+from brrp_cli.finite import check_finite
 from brrp_cli.methods.base import Axes, OccupancyPosterior, Surface
+
+# How far, at least, the occupancy of what is inside lies above the level: 10 micrometres.
+_CLEAR = 1e-3
 
 
 def lattice_axes(bounds: NDArray[np.floating], spacing: float) -> Axes:
@@ -22,27 +28,51 @@ def extract_surface(
 
     observed : (n, 3) points of the object, metres, camera frame. Parts of the level set that no
     observed point is near are dropped: where neither rays nor prior samples reach, the map keeps
-    the noise that the particles started from. Returns None when nothing is left.
+    the noise that the particles started from. Returns None when nothing is left. Errors: BrrpError
+    if the posterior is not finite.
+    """
+    axes = lattice_axes(posterior.bounds, config.spacing)
+    volume = posterior.probability_volume(axes)
+    check_finite("The posterior", occupancy=volume)
+    found = level_set(volume, axes, observed, config.level, config)
+    if found is None:
+        return None
+    uncertainty = posterior.surface_uncertainty(found.vertices)
+    check_finite("The surface", vertices=found.vertices, uncertainty=uncertainty)
+    return Surface(found.vertices, found.faces, uncertainty, posterior.surface_unit)
+
+
+class LevelSet(NamedTuple):
+    """A closed, outward mesh: vertices (n, 3) float64, metres, camera frame; faces (m, 3) int64."""
+
+    vertices: NDArray[np.float64]
+    faces: NDArray[np.int64]
+
+
+def level_set(
+    volume: NDArray[np.floating],
+    axes: Axes,
+    observed: NDArray[np.floating],
+    level: float,
+    config: SurfaceConfig,
+) -> LevelSet | None:
+    """Marching cubes at `level` on occupancy (nx, ny, nz) at the nodes of `axes`, metres, camera
+    frame; parts that no point of `observed` (n, 3) is near are dropped. None if nothing is left.
     """
     from skimage.measure import marching_cubes
 
-    axes = lattice_axes(posterior.bounds, config.spacing)
-    volume = posterior.probability_volume(axes)
     origin = np.array([axis[0] for axis in axes])
-    kept = _near_observed(volume >= config.level, (observed - origin) / config.spacing, config)
+    kept = _near_observed(volume >= level, (observed - origin) / config.spacing, config)
     if not kept.any():
         return None
     # What was dropped must not leave a surface; a border of zeros closes what touches the bounds.
-    volume = np.where((volume >= config.level) & ~kept, 0.0, volume)
+    volume = np.where((volume >= level) & ~kept, 0.0, volume)
+    # A node on the level itself is a surface without volume, or none at all.
+    volume = np.where(kept, np.maximum(volume, level + _CLEAR), volume)
     volume = np.pad(volume, 1)
-    vertices, faces, _, _ = marching_cubes(volume, config.level, gradient_direction="ascent")
+    vertices, faces, _, _ = marching_cubes(volume, level, gradient_direction="ascent")
     vertices = (vertices.astype(np.float64) - 1) * config.spacing + origin
-    return Surface(
-        vertices,
-        faces.astype(np.int64),
-        posterior.surface_uncertainty(vertices),
-        posterior.surface_unit,
-    )
+    return LevelSet(vertices, faces.astype(np.int64))
 
 
 def _near_observed(

@@ -1,4 +1,5 @@
-"""The files of a reconstruction: meshes, one scene, the posterior, a record and a picture."""
+"""The files of a reconstruction: meshes, one scene, the posterior, a record, a picture, and the
+frame that it is of."""
 
 from __future__ import annotations
 
@@ -13,6 +14,7 @@ from numpy.typing import NDArray
 from brrp_cli.errors import OutputError
 from brrp_cli.files import atomic_folder, check_writable, refuse_folder
 from brrp_cli.frames.frame import Frame
+from brrp_cli.frames.npz import save_frame
 from brrp_cli.geometry import transform_points
 from brrp_cli.inference.posterior_file import save_posteriors
 from brrp_cli.methods.base import ObjectReconstruction, Retrieved, Surface
@@ -27,6 +29,10 @@ if TYPE_CHECKING:
 
 SCHEMA = 1
 RECORD = "result.json"
+FRAME = "frame.npz"
+POSTERIOR = "posterior.h5"
+# Metres; vertices are single precision, which has steps of a tenth of a millimetre there.
+FARTHEST_ORIGIN = 1000.0
 LIBRARIES = ("torch", "open3d", "numpy", "scipy", "scikit-image", "trimesh", "h5py", "onnxruntime")
 
 
@@ -51,8 +57,9 @@ def write_results(
         if meshes:
             _scene(meshes).export(partial / "scene.glb")
         posteriors = {o.object_id: o.posterior for o in result.objects if o.posterior is not None}
-        save_posteriors(posteriors, partial / "posterior.h5")
-        record = json.dumps(result_record(result, frame), indent=2) + "\n"
+        save_posteriors(posteriors, partial / POSTERIOR)
+        save_frame(result.frame, partial / FRAME)
+        record = json.dumps(result_record(result, frame), indent=2, allow_nan=False) + "\n"
         (partial / RECORD).write_text(record)
         caption = (
             f"retrieved by {result.retriever}" if result.retriever else f"{result.method}, no prior"
@@ -86,6 +93,15 @@ def T_frame_cam(seen: Frame, frame: str) -> NDArray[np.float64]:
             where=seen.source,
             expected="the key T_world_cam, (4, 4)",
             fix="add it to the frame, or ask for --frame camera",
+        )
+    distance = float(np.linalg.norm(seen.T_world_cam[:3, 3]))
+    if distance > FARTHEST_ORIGIN:
+        raise OutputError(
+            "The world's origin is too far away for meshes in single precision",
+            where=seen.source,
+            expected=f"at most {FARTHEST_ORIGIN:g} m from the camera",
+            found=f"{distance:g} m",
+            fix="ask for --frame camera, or give T_world_cam with a nearer origin",
         )
     return seen.T_world_cam
 

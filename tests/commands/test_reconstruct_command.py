@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 from pathlib import Path
 
 import h5py
@@ -106,6 +107,7 @@ def test_writes_everything_and_says_so(out):
     assert {p.name for p in folder.iterdir()} == {
         "object_250.ply",
         "object_-7.ply",
+        "frame.npz",
         "scene.glb",
         "posterior.h5",
         "result.json",
@@ -174,9 +176,10 @@ def test_the_scene_holds_all_meshes(out):
 def test_the_posterior_can_be_asked_again(out):
     mesh = trimesh.load_mesh(out[0] / "object_250.ply", process=False)
     posterior = open_posterior(out[0] / "posterior.h5")[CAN]
-    on_surface = posterior.probability(mesh.vertices)
     # Between two nodes 5 mm apart marching cubes draws a straight line.
-    assert np.abs(on_surface - 0.5).mean() < 0.05
+    level, step = preset("default").surface.level, 0.005 * mesh.vertex_normals
+    assert (posterior.probability(mesh.vertices - step) > level).mean() > 0.95
+    assert (posterior.probability(mesh.vertices + step) < level).mean() > 0.95
     far = mesh.bounds.mean(axis=0) + [0, 0, 0.19]
     assert posterior.probability(far[None])[0] < 0.5
 
@@ -258,7 +261,7 @@ def test_where_no_object_gets_a_surface_the_record_is_written_all_the_same(
     assert "object 12: too_few_points  5 " in output and "are needed" in output
     assert "Wrote 0 of 1 objects" in output and "no mesh: result.json says why" in output
     names = {path.name for path in (tmp_path / "out").iterdir()}
-    assert names == {"posterior.h5", "result.json", "preview.png"}
+    assert names == {"frame.npz", "posterior.h5", "result.json", "preview.png"}
     record = json.loads((tmp_path / "out" / "result.json").read_text())
     assert [(o["id"], o["status"], o["mesh"]) for o in record["objects"]] == [
         (SPECK, "too_few_points", None)
@@ -298,6 +301,18 @@ def test_another_configuration_than_the_priors_is_refused(frame_file, prior):
     config = Config(features=FeatureConfig(voxel=0.005))
     with pytest.raises(PriorError, match=r"voxel: 0.01 -> 0.005"):
         reconstruct(load_frame(frame_file), open_prior(prior), config=config)
+
+
+def test_a_damaged_shard_is_never_used(frame_file, prior, tmp_path):
+    damaged = Path(shutil.copytree(prior, tmp_path / "prior"))
+    for shard in (damaged / "shards").iterdir():
+        data = bytearray(shard.read_bytes())
+        data[len(data) // 2] ^= 1
+        shard.write_bytes(data)
+    code, output = run(frame_file, "--prior", damaged, "-o", tmp_path / "out")
+    assert code == 1
+    assert output.count("A shard is damaged") == 1 and "brrp build-prior" in output
+    assert not (tmp_path / "out").exists()
 
 
 def test_the_posterior_file_of_another_schema_is_refused(out, tmp_path):

@@ -50,14 +50,14 @@ def test_images_become_meshes_in_one_command(images, tmp_path, caplog):
         result = run(*files(images), "-o", out)
     assert result.exit_code == 0, result.output
     assert len(list(out.glob("object_*.ply"))) == 2
-    assert load_frame(tmp_path / "out.npz").object_ids == [1, 2]
+    assert load_frame(out / "frame.npz").object_ids == [1, 2]
     assert (tmp_path / "out.masks.png").is_file()
     assert "taken as millimetres" in caplog.text
     assert "out.masks.png" in result.output
     assert "brrp segment" in result.output
     # What was written is corrected, and reconstructed again, by the same commands.
     fixed = tmp_path / "fixed.npz"
-    arguments = ["segment", tmp_path / "out.npz", "--drop", "1", "-o", fixed]
+    arguments = ["segment", out / "frame.npz", "--drop", "1", "-o", fixed]
     assert CliRunner().invoke(main, list(map(str, arguments))).exit_code == 0
     again = run(fixed)
     assert again.exit_code == 0, again.output

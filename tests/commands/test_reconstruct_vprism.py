@@ -91,6 +91,7 @@ def test_writes_what_brrp_writes_and_says_so(out):
     assert {p.name for p in folder.iterdir()} == {
         "object_40.ply",
         "object_-2.ply",
+        "frame.npz",
         "scene.glb",
         "posterior.h5",
         "result.json",

@@ -2,6 +2,11 @@ import csv
 import json
 import math
 import shutil
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,8 +15,9 @@ from older_prior import older_prior
 from PIL import Image
 from tiny_scenes import write_meshes, write_scene
 
+import brrp_cli
 from brrp_cli.cli import main
-from brrp_cli.evaluation.rows import COLUMNS, COST
+from brrp_cli.evaluation.rows import COLUMNS, COST, RowLog, finished
 from brrp_cli.prior.build import build_prior
 from brrp_cli.prior.parameters import BuildParameters
 
@@ -237,3 +243,65 @@ def test_what_an_older_prior_lacks_is_told_once_before_the_work(
     assert result.exit_code == 1
     assert result.output.count(text) == 1 and "--overwrite" in result.output
     assert not (tmp_path / "out").exists()
+
+
+def started(place, output):
+    """The command in a process of its own, as people run it."""
+    words = ["-q", "eval", place / "scenes", "--method", "vprism", "--shift-masks", "0,1,2"]
+    return subprocess.Popen(
+        [sys.executable, "-m", "brrp_cli", *map(str, words), "-o", str(output), "--workers", "2"],
+        cwd=Path(brrp_cli.__file__).parents[1],
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
+        text=True,
+        # A shell lets its background processes, and theirs, ignore Ctrl-C.
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
+    )
+
+
+def after_rows(process, output, count):
+    """Wait until that many rows are there, or the process has ended."""
+    path = output / "rows.jsonl"
+    while process.poll() is None:
+        if path.exists() and path.read_bytes().count(b"\n") >= count:
+            return
+        time.sleep(0.01)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("sent", [signal.SIGKILL, signal.SIGINT, signal.SIGTERM])
+def test_a_run_that_is_stopped_again_and_again_ends_with_the_same_table(place, tmp_path, sent):
+    """After each row that came; workers of a killed run may still be at work beside the next."""
+    with started(place, tmp_path / "whole") as process:
+        assert process.wait() == 3, process.stderr.read()
+    output = tmp_path / "stopped"
+    total = len((tmp_path / "whole" / "rows.jsonl").read_bytes().splitlines())
+    stops = 0
+    for count in range(1, total):
+        with started(place, output) as process:
+            after_rows(process, output, count)
+            process.send_signal(sent)
+            told = process.stderr.read()
+        if process.returncode == 3:
+            continue
+        stops += 1
+        assert process.returncode == (-9 if sent == signal.SIGKILL else 128 + sent), told
+        assert "Traceback" not in told
+        if sent != signal.SIGKILL:
+            assert "give the same command again to go on" in told
+    assert stops >= 3
+    with started(place, output) as process:
+        assert process.wait() == 3
+    assert without_cost(rows_of(output)) == without_cost(rows_of(tmp_path / "whole"))
+
+
+def test_a_line_that_was_cut_in_the_middle_of_the_rows_is_run_again(place, first, tmp_path):
+    """A full disk may cut one worker's row, and let another write the next."""
+    folder, _ = first
+    shutil.copytree(folder, tmp_path / "cut")
+    path = tmp_path / "cut" / "rows.jsonl"
+    lines = path.read_bytes().splitlines(keepends=True)
+    lines[1] = lines[1][:40]
+    path.write_bytes(b"".join(lines))
+    kept, _ = finished(RowLog(path).read())
+    assert 0 < len(kept) < len(lines)

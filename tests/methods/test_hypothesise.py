@@ -132,7 +132,7 @@ def test_a_map_that_is_nowhere_sure_enough_has_no_surface_but_files(folder, trut
     result = reconstruct(photograph({CAN: truth[CAN]}), open_prior(folder), config=config)
     assert result.objects[0].status == NO_SURFACE
     names = {path.name for path in write_results(result, tmp_path / "out")}
-    assert names == {"posterior.h5", "result.json", "preview.png"}
+    assert names == {"frame.npz", "posterior.h5", "result.json", "preview.png"}
     assert list(open_posterior(tmp_path / "out" / "posterior.h5")) == [CAN]
 
 

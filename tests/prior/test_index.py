@@ -1,5 +1,6 @@
 import hashlib
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -9,7 +10,7 @@ from brrp_cli.errors import PriorError
 from brrp_cli.files import sha256_file
 from brrp_cli.prior.build import build_prior
 from brrp_cli.prior.index import INDEX_FILE
-from brrp_cli.prior.manifest import FILE, read_manifest
+from brrp_cli.prior.manifest import FILE, Failure, read_manifest, write_manifest
 from brrp_cli.prior.store import open_prior
 
 
@@ -76,7 +77,8 @@ def test_a_manifest_that_was_damaged_later_is_noticed(prior_folder: Path) -> Non
 
 def test_another_manifest_than_that_which_was_opened_is_told(prior_folder: Path) -> None:
     prior = open_prior(prior_folder)
-    (prior_folder / FILE).write_bytes((prior_folder / FILE).read_bytes() + b"\n")
+    write_manifest(prior_folder, replace(prior.manifest, failed=[Failure("a", "a.obj", "why")]))
+    prior = replace(prior)
     with pytest.raises(PriorError, match="built again"):
         prior.manifest  # noqa: B018
     assert open_prior(prior_folder).manifest.objects

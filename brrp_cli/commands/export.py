@@ -1,0 +1,129 @@
+"""`brrp export OUT/`: collision shapes for simulators and motion planners."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from brrp_cli.planning.options import DENSITY, PlanOptions
+from brrp_cli.planning.parts import COACD, HOW
+from brrp_cli.progress import note
+
+if TYPE_CHECKING:
+    from brrp_cli.planning.scene import PlannedObject
+    from brrp_cli.surface.stored import StoredResult
+
+FOLDER = "plan"
+CONFIDENCE = click.FloatRange(0.5, 0.999)
+
+
+@click.command("export")
+@click.argument("results", metavar="OUT/", type=click.Path(path_type=Path))
+@click.option("-o", "--output", type=click.Path(path_type=Path), help="[default: OUT/plan]")
+@click.option(
+    "--collision",
+    type=click.Choice(HOW),
+    default=COACD,
+    show_default=True,
+    help="coacd keeps hollows and takes seconds an object; hull is one part and fills them.",
+)
+@click.option(
+    "--confidence",
+    type=CONFIDENCE,
+    help="Collision shapes inside which each object lies with this probability, such as 0.95. "
+    "[default: shapes of the meshes]",
+)
+@click.option(
+    "--margin",
+    type=click.FloatRange(min=0, max=200),
+    default=0.0,
+    show_default=True,
+    help="Millimetres by which the shapes of --confidence grow into space not seen to be empty.",
+)
+@click.option(
+    "--density",
+    type=click.FloatRange(min=0, min_open=True),
+    default=DENSITY,
+    show_default=True,
+    help="kg / m^3 of solid objects, for mass and inertia.",
+)
+@click.option("--seed", type=int, default=0, show_default=True)
+@click.option("--overwrite", is_flag=True, help="Replace the output folder if it is there.")
+def command(
+    results: Path,
+    output: Path | None,
+    collision: str,
+    confidence: float | None,
+    margin: float,
+    density: float,
+    seed: int,
+    overwrite: bool,
+) -> None:
+    """Turn results into collision shapes: URDF, MJCF, a cuRobo world.
+
+    OUT/ is a folder that `brrp reconstruct` wrote. For each object: convex parts, a URDF and an
+    MJCF; for all of them scene.xml (MuJoCo), world.yml (cuRobo) and scene.glb, in the frame of
+    the results. Lengths are metres, masses kilograms.
+
+    \b
+    Example:
+      brrp export out/ --collision hull
+      brrp export out/ --confidence 0.95 -o plan/
+    """
+    from brrp_cli.surface.stored import open_result
+
+    if margin and confidence is None:
+        raise click.UsageError("--margin grows the shapes of --confidence, so give both")
+    options = PlanOptions(collision, confidence, margin / 1000, density, seed)
+    export(open_result(results), output, options, overwrite=overwrite)
+
+
+def export(
+    stored: StoredResult, output: Path | None, options: PlanOptions, *, overwrite: bool
+) -> None:
+    """Write the plan, with a line for each object. Errors: those of `write_plan`."""
+    from brrp_cli.planning.write import write_plan
+
+    folder = output or stored.folder / FOLDER
+    record = write_plan(
+        stored, folder, options, overwrite=overwrite, planned=watched(stored, options)
+    )
+    for item in record["objects"]:
+        note(f"  object {item['id']}: {told(item)}")
+    for item in record["left_out"]:
+        note(f"  object {item['id']}: left out, {item['why']}")
+    shapes = (
+        "of the meshes"
+        if options.confidence is None
+        else f"that hold the objects with probability {options.confidence:g}"
+    )
+    click.echo(
+        f"Wrote collision shapes {shapes} ({options.collision}) of {len(record['objects'])} "
+        f"objects, metres, {record['frame']} frame: {folder}/ "
+        "(object_*.urdf, object_*.xml, scene.xml, world.yml, scene.glb, plan.json)"
+    )
+
+
+def told(item: dict[str, Any]) -> str:
+    """One object's numbers for people."""
+    count = len(item["parts"])
+    text = f"{count} part{'s' if count > 1 else ''}, {item['mass'] * 1000:.0f} g"
+    if "level" in item:
+        text += (
+            f", {item['margin_mean'] * 1000:.1f} mm beyond the mesh on average"
+            f" ({item['margin_max'] * 1000:.0f} at most)"
+        )
+        if not item["bounded"]:
+            text += "; the shape is cut off where the posterior ends"
+    return text
+
+
+def watched(stored: StoredResult, options: PlanOptions) -> Iterator[PlannedObject]:
+    """The planned objects behind a progress bar."""
+    from brrp_cli.planning.scene import planned_objects
+    from brrp_cli.progress import progress
+
+    return iter(progress(planned_objects(stored, options), "collision", len(stored.surfaces)))

@@ -1,0 +1,62 @@
+"""`brrp view OUT/`: one HTML page that shows results."""
+
+from __future__ import annotations
+
+import webbrowser
+from pathlib import Path
+
+import click
+
+from brrp_cli.progress import note
+
+
+@click.command("view")
+@click.argument("results", metavar="OUT/", type=click.Path(path_type=Path))
+@click.option(
+    "-o",
+    "--output",
+    metavar="PAGE.html",
+    type=click.Path(path_type=Path),
+    help="[default: OUT/view.html]",
+)
+@click.option("--open/--no-open", "open_it", default=True, help="Open the page in a browser.")
+@click.option(
+    "--rerun",
+    is_flag=True,
+    help="Show in Rerun instead (pip install rerun-sdk); -o FILE.rrd writes.",
+)
+def command(results: Path, output: Path | None, open_it: bool, rerun: bool) -> None:
+    """Write and open one HTML page that shows the results in OUT/.
+
+    The page holds all that it needs, so that it can be kept, sent and opened without a network:
+    the image, the observed points, every object to turn on and off, uncertainty as colour, what
+    was retrieved and how sure that is, and the collision shapes where `brrp export` wrote some.
+
+    \b
+    Example:
+      brrp view out/
+      brrp view out/ --no-open -o page.html
+      brrp view out/ --rerun
+    """
+    from brrp_cli.files import write_bytes
+    from brrp_cli.surface.stored import open_result
+
+    stored = open_result(results)
+    if rerun:
+        from brrp_cli.view.rerun import show
+
+        show(stored, output, title(results))
+        return
+    from brrp_cli.view.page import page
+
+    path = output or stored.folder / "view.html"
+    text = page(stored, title(results)).encode("utf-8")
+    write_bytes(path, text)
+    click.echo(f"Wrote {path} ({len(text) / 1e6:.1f} MB)")
+    if open_it and not webbrowser.open(path.resolve().as_uri()):
+        note("No browser could be opened: open the file yourself")
+
+
+def title(results: Path) -> str:
+    """What the page is called: the folder's name."""
+    return results.resolve().name

@@ -1,0 +1,1 @@
+"""What simulators and motion planners read: convex parts, URDF, MJCF, a cuRobo world."""

@@ -1,0 +1,52 @@
+"""cuRobo's world file."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brrp_cli.planning.body import Body
+from brrp_cli.planning.mjcf import Table
+from brrp_cli.planning.numbers import quaternion_wxyz
+from brrp_cli.planning.union import union_of_hulls
+
+
+def curobo_world(bodies: Mapping[str, Body], table: Table | None, frame: str) -> str:
+    """YAML for `curobo.geom.types.WorldConfig.from_dict`: a mesh for each body, a cuboid as table.
+
+    Poses are x y z qw qx qy qz in metres. The meshes stand in the file itself: cuRobo looks for
+    files below a folder of its own. A body's parts are joined into one closed surface, since cuRobo
+    tells inside from outside by counting the faces that a ray crosses.
+    """
+    lines = [f"# metres; poses are x y z qw qx qy qz in the {frame} frame of the results"]
+    if table is not None:
+        lines += [
+            "cuboid:",
+            "  table:",
+            f"    dims: {_row(table.size)}",
+            f"    pose: {_pose(table.T_frame_table)}",
+        ]
+    lines.append("mesh:")
+    for name, body in bodies.items():
+        vertices, faces = union_of_hulls(body.parts)
+        lines += [
+            f"  {name}:",
+            f"    pose: {_pose(body.T_frame_body)}",
+            f"    color: {_row([*body.colour, 1.0])}",
+            "    vertices:",
+            *(f"    - {_row(vertex)}" for vertex in vertices),
+            "    faces:",
+            *(f"    - [{a}, {b}, {c}]" for a, b, c in faces),
+        ]
+    return "\n".join(lines) + "\n"
+
+
+def _pose(T: NDArray[np.float64]) -> str:
+    return _row([*T[:3, 3], *quaternion_wxyz(T[:3, :3])])
+
+
+def _row(values: Iterable[float]) -> str:
+    # Fixed point: YAML 1.1 takes 1e-05, without a point in it, for a string.
+    return "[" + ", ".join(f"{float(np.round(v, 7)) + 0.0:.7f}" for v in values) + "]"

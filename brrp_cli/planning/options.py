@@ -1,0 +1,23 @@
+"""What a user decides about collision shapes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from brrp_cli.planning.parts import COACD
+
+# kg / m^3. A guess between an empty box (200) and a full bottle (1,000).
+DENSITY = 500.0
+
+
+@dataclass(frozen=True)
+class PlanOptions:
+    """collision : "coacd" or "hull"; confidence : that the object lies inside of its collision
+    shape, None: the shape is of the mesh; margin : metres by which the shape is grown beyond that
+    into space that was not seen to be empty; density : kg / m^3, of the solid mesh."""
+
+    collision: str = COACD
+    confidence: float | None = None
+    margin: float = 0.0
+    density: float = DENSITY
+    seed: int = 0

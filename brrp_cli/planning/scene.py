@@ -1,0 +1,133 @@
+"""From results to bodies on a table."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brrp_cli.config import MeanConfig
+from brrp_cli.errors import ResultError
+from brrp_cli.frames.plane import Plane
+from brrp_cli.geometry import similarity, transform_points
+from brrp_cli.inference.mean import empty_space
+from brrp_cli.planning.body import Body, body_axes, body_pose, mass_and_inertia
+from brrp_cli.planning.mjcf import Table
+from brrp_cli.planning.options import PlanOptions
+from brrp_cli.planning.parts import convex_parts
+from brrp_cli.surface.confidence import ConfidenceSurface, confidence_surface
+from brrp_cli.surface.stored import StoredResult
+
+if TYPE_CHECKING:
+    import trimesh
+
+# Of the table: metres beyond the objects' corners, and from its top to its lower side.
+TABLE_MARGIN, TABLE_THICKNESS = 0.25, 0.02
+IMAGE_UP = np.array([0.0, -1.0, 0.0])
+
+
+@dataclass(frozen=True)
+class PlannedObject:
+    """A body, and the region that its collision shape was made of where one was asked for."""
+
+    object_id: int
+    body: Body
+    region: ConfidenceSurface | None
+
+
+def planned_objects(stored: StoredResult, options: PlanOptions) -> Iterator[PlannedObject]:
+    """One for each object that has a mesh, as soon as it is made.
+
+    Errors: ResultError where a mesh encloses nothing; DependencyError without CoACD.
+    """
+    T_frame_cam = stored.T_frame_cam
+    axes = body_axes(upwards(stored), T_frame_cam[:3, 0])
+    for object_id, surface in stored.surfaces.items():
+        mesh = surface.as_trimesh()
+        if not mesh.is_watertight or mesh.volume <= 0:
+            raise ResultError(
+                "A mesh of the results encloses nothing",
+                where=stored.folder / f"object {object_id}",
+                fix="run `brrp reconstruct` again",
+            )
+        region = None
+        if options.confidence is not None:
+            region = _region(stored, object_id, options.confidence, options.margin)
+        T_frame_body = body_pose(mesh, axes)
+        T_body_frame = np.linalg.inv(T_frame_body)
+        local = mesh.copy().apply_transform(T_body_frame)
+        collision = local if region is None else _as_mesh(region, T_body_frame @ T_frame_cam)
+        vertices = np.asarray(collision.vertices, dtype=np.float64)
+        faces = np.asarray(collision.faces, dtype=np.int64)
+        mass, inertia = mass_and_inertia(local, options.density)
+        body = Body(
+            name=f"object_{object_id}",
+            T_frame_body=T_frame_body,
+            mesh=local,
+            collision=collision,
+            parts=convex_parts(vertices, faces, options.collision, options.seed),
+            mass=mass,
+            inertia=inertia,
+            colour=_colour(stored, object_id),
+        )
+        yield PlannedObject(object_id, body, region)
+
+
+def upwards(stored: StoredResult) -> NDArray[np.float64]:
+    """(3,) the table's normal in the frame of the meshes; without a table, up in the image."""
+    plane = stored.plane
+    return stored.T_frame_cam[:3, :3] @ IMAGE_UP if plane is None else plane.normal
+
+
+def table_under(bodies: list[Body], plane: Plane | None) -> Table | None:
+    """A table whose top is the plane, under all bodies; None without a plane."""
+    if plane is None or not bodies:
+        return None
+    axes = body_axes(plane.normal, bodies[0].T_frame_body[:3, 0])
+    corners = np.vstack([transform_points(b.T_frame_body, np.vstack(b.parts)) for b in bodies])
+    local = corners @ axes
+    low, high = local.min(axis=0) - TABLE_MARGIN, local.max(axis=0) + TABLE_MARGIN
+    middle = (low + high) / 2
+    middle[2] = -plane.offset - TABLE_THICKNESS / 2
+    size = np.array([*(high - low)[:2], TABLE_THICKNESS])
+    return Table(similarity(1.0, axes, axes @ middle), size)
+
+
+def _region(
+    stored: StoredResult, object_id: int, confidence: float, margin: float
+) -> ConfidenceSurface:
+    def empty(points: NDArray[np.float64]) -> NDArray[np.bool_]:
+        return empty_space(points, stored.frame, object_id, stored.plane_cam, MeanConfig())
+
+    found = confidence_surface(
+        stored.posteriors[object_id],
+        stored.frame.object_points(object_id),
+        confidence,
+        stored.surface_config,
+        margin,
+        empty,
+    )
+    if found is None:
+        raise ResultError(
+            "The posterior holds the object for empty, but it has a mesh",
+            where=stored.folder / f"object {object_id}",
+            fix="run `brrp reconstruct` again",
+        )
+    return found
+
+
+def _as_mesh(region: ConfidenceSurface, T_body_cam: NDArray[np.float64]) -> trimesh.Trimesh:
+    import trimesh
+
+    return trimesh.Trimesh(
+        transform_points(T_body_cam, region.vertices), region.faces, process=False
+    )
+
+
+def _colour(stored: StoredResult, object_id: int) -> NDArray[np.float64]:
+    """(3,) median of the object's pixels, 0 to 1."""
+    pixels = stored.frame.rgb[stored.frame.segmap == object_id]
+    return np.median(pixels, axis=0) / 255 if len(pixels) else np.full(3, 0.5)

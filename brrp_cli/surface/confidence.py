@@ -1,0 +1,134 @@
+"""The surface inside which an object lies with a given probability.
+
+A posterior tells for each point how probably it is occupied. Of the whole shape O it says this:
+particle i is drawn with probability 1 / P, a level u uniformly from (0, 1), and
+
+    O = {x : p_i(x) > u}.
+
+So every point is occupied with the posterior's p(x) = mean_i p_i(x). Within a particle the surface
+lies further out or further in as a whole; from particle to particle it differs as they differ. The
+region that is sought is the smallest of
+
+    C_t = {x : p(x) >= t}    with    P(O in C_t) = 1 - mean_i sup {p_i(x) : p(x) < t} >= confidence,
+
+a statement about all of O at once. It is never smaller than {p >= 1 - confidence}, which holds for
+each point alone, and is the same where there is one particle. Nested level sets of p as candidates
+and a joint probability to choose among them: Bolin and Lindgren, "Excursion and contour uncertainty
+regions for latent Gaussian models", JRSS B 77 (2015), section 2.
+
+The posterior is what it is: where it is too sure, so is C_t. A margin d grows C_t beyond it, into
+{x outside of C_t : distance to C_t <= d and x was not seen to be empty}.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brrp_cli.config import SurfaceConfig
+from brrp_cli.inference.particles import particle_volumes
+from brrp_cli.methods.base import Axes, OccupancyPosterior
+from brrp_cli.surface.extract import lattice_axes, level_set
+
+# Which of points (n, 3), metres, camera frame, were seen to be empty: (n,) bool.
+Empty = Callable[[NDArray[np.float64]], NDArray[np.bool_]]
+
+
+@dataclass(frozen=True)
+class ConfidenceSurface:
+    """A closed, outward mesh that the object lies inside of with probability `confidence`.
+
+    vertices : (n, 3) float64, metres, camera frame; faces : (m, 3) int64
+    level : t, the occupancy probability on it
+    bounded : false where the region reaches the end of what the posterior describes, so that
+    the object may go on beyond it
+    """
+
+    vertices: NDArray[np.float64]
+    faces: NDArray[np.int64]
+    confidence: float
+    level: float
+    bounded: bool
+
+
+def confidence_level(volumes: NDArray[np.floating], confidence: float) -> float | None:
+    """The largest t at which P(O in C_t) >= confidence; None where even "O is empty" is that
+    probable.
+
+    volumes : (P, ...) occupancy of each particle at the points of a lattice; confidence : in (0, 1)
+    """
+    particles = volumes.reshape(len(volumes), -1)
+    mean = particles.mean(axis=0)
+    order = np.argsort(mean, kind="stable")
+    # P(O not in C) when the first k points are outside of C.
+    missed = np.maximum.accumulate(particles[:, order], axis=1).mean(axis=0)
+    left_out = int(np.searchsorted(missed, 1 - confidence, side="right"))
+    return None if left_out == len(mean) else float(mean[order[left_out]])
+
+
+def confidence_surface(
+    posterior: OccupancyPosterior,
+    observed: NDArray[np.floating],
+    confidence: float,
+    config: SurfaceConfig,
+    margin: float = 0.0,
+    empty: Empty | None = None,
+) -> ConfidenceSurface | None:
+    """The boundary of the smallest C_t that holds the object with probability `confidence`.
+
+    observed : (n, 3) points of the object, metres, camera frame. As with the mesh, parts that no
+    observed point is near are dropped. None where nothing is left.
+    margin : metres by which C_t is grown where `empty` does not forbid it
+    """
+    axes = lattice_axes(posterior.bounds, config.spacing)
+    volumes = particle_volumes(posterior, axes)
+    level = confidence_level(volumes, confidence)
+    if level is None:
+        return None
+    # The mesh is the best guess, at whatever level: it lies inside in any case.
+    level = min(level, config.level)
+    mean = volumes.mean(axis=0)
+    found = level_set(mean, axes, observed, level, config)
+    if found is not None and margin > 0:
+        # In units of the level, so that the surface of C_t stays where it may not grow.
+        grown, wider = _grown(mean / level, axes, margin, config.spacing, empty)
+        found = level_set(grown, wider, observed, 1.0, config)
+    if found is None:
+        return None
+    return ConfidenceSurface(
+        found.vertices, found.faces, confidence, level, bounded=not _at_edge(mean >= level)
+    )
+
+
+def _at_edge(region: NDArray[np.bool_]) -> bool:
+    """Whether a region (nx, ny, nz) reaches an outermost node of its lattice."""
+    inner = np.zeros_like(region)
+    inner[1:-1, 1:-1, 1:-1] = True
+    return bool((region & ~inner).any())
+
+
+def _grown(
+    volume: NDArray[np.floating],
+    axes: Axes,
+    margin: float,
+    spacing: float,
+    empty: Empty | None,
+) -> tuple[NDArray[np.float64], Axes]:
+    """A volume on a lattice that is wider by `margin`, at least 1 within `margin` of where the
+    given one is; nodes that are `empty` keep their value."""
+    from scipy.ndimage import distance_transform_edt
+
+    cells = int(np.ceil(margin / spacing)) + 1
+    steps = spacing * np.arange(1, cells + 1)
+    x, y, z = (np.concatenate([a[0] - steps[::-1], a, a[-1] + steps]) for a in axes)
+    volume = np.pad(volume.astype(np.float64), cells)
+    distance = distance_transform_edt(volume < 1) * spacing
+    may_grow = (distance > 0) & (distance < margin + spacing)
+    if empty is not None:
+        nodes = np.stack(np.meshgrid(x, y, z, indexing="ij"), axis=-1)
+        may_grow[may_grow] = ~empty(nodes[may_grow])
+    grown = np.where(may_grow, np.maximum(volume, 1 + (margin - distance) / spacing), volume)
+    return grown, (x, y, z)

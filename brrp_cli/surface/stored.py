@@ -1,0 +1,149 @@
+"""A folder of results, read back."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brrp_cli.config import SurfaceConfig
+from brrp_cli.errors import ResultError
+from brrp_cli.frames.frame import Frame
+from brrp_cli.frames.npz import load_frame
+from brrp_cli.frames.plane import Plane
+from brrp_cli.geometry import transform_points
+from brrp_cli.methods.base import OccupancyPosterior, Surface
+from brrp_cli.surface.results import FRAME, POSTERIOR, RECORD, SCHEMA
+
+if TYPE_CHECKING:
+    import trimesh
+
+INSIDE_DEMO = "result"
+AGAIN = "run `brrp reconstruct` again"
+
+
+@dataclass(frozen=True)
+class StoredResult:
+    """What `write_results` wrote. record : the content of result.json.
+
+    Meshes, points and the plane are given in the frame of the meshes (`record["frame"]`), metres;
+    the posteriors and `frame` know the camera frame only.
+    """
+
+    folder: Path
+    record: dict[str, Any]
+
+    @cached_property
+    def T_frame_cam(self) -> NDArray[np.float64]:
+        """(4, 4), from the camera frame to the frame of the meshes."""
+        return np.asarray(self.record["T_frame_cam"], dtype=np.float64)
+
+    @property
+    def object_ids(self) -> list[int]:
+        """Ids of all objects of the frame, with a mesh or without."""
+        return [item["id"] for item in self.record["objects"]]
+
+    @cached_property
+    def surfaces(self) -> dict[int, Surface]:
+        """Meshes by object id, in the frame of the meshes. Errors: ResultError."""
+        return {
+            item["id"]: self._surface(item["mesh"], item["uncertainty_unit"])
+            for item in self.record["objects"]
+            if item["mesh"] is not None
+        }
+
+    @cached_property
+    def frame(self) -> Frame:
+        """The frame that was reconstructed. Errors: FrameError."""
+        return load_frame(self.folder / FRAME)
+
+    @cached_property
+    def posteriors(self) -> dict[int, OccupancyPosterior]:
+        """Posteriors by object id. Errors: BrrpError."""
+        from brrp_cli.inference.posterior_file import open_posterior
+
+        return open_posterior(self.folder / POSTERIOR)
+
+    @property
+    def plane_cam(self) -> Plane | None:
+        """The support plane in the camera frame."""
+        stored = self.record["plane_cam"]
+        return None if stored is None else Plane(np.asarray(stored["normal"]), stored["offset"])
+
+    @property
+    def plane(self) -> Plane | None:
+        """The support plane in the frame of the meshes."""
+        plane = self.plane_cam
+        if plane is None:
+            return None
+        on_plane = transform_points(self.T_frame_cam, -plane.offset * plane.normal)
+        normal = self.T_frame_cam[:3, :3] @ plane.normal
+        return Plane(normal, float(-normal @ on_plane))
+
+    @property
+    def surface_config(self) -> SurfaceConfig:
+        """How the meshes were made."""
+        return SurfaceConfig(**self.record["config"]["surface"])
+
+    def _surface(self, name: str, unit: str) -> Surface:
+        mesh = _read_mesh(self.folder / name)
+        values = mesh.metadata["_ply_raw"]["vertex"]["data"]["uncertainty"]
+        return Surface(
+            np.asarray(mesh.vertices, dtype=np.float64),
+            np.asarray(mesh.faces, dtype=np.int64),
+            np.asarray(values, dtype=np.float32).reshape(-1),
+            unit,
+        )
+
+
+def open_result(folder: str | Path) -> StoredResult:
+    """The results in a folder that `brrp reconstruct` wrote, or in one of `brrp demo`.
+
+    Errors: ResultError if there are none, or if they are of another schema.
+    """
+    folder = Path(folder)
+    if not (folder / RECORD).is_file() and (folder / INSIDE_DEMO / RECORD).is_file():
+        folder = folder / INSIDE_DEMO
+    path = folder / RECORD
+    try:
+        record = json.loads(path.read_text())
+    except (OSError, ValueError) as error:
+        raise ResultError(
+            "There are no results that can be read",
+            where=folder,
+            expected=f"a folder that `brrp reconstruct` wrote, with {RECORD} in it",
+            found=error.strerror if isinstance(error, OSError) else error,
+            fix="give the folder that `brrp reconstruct` named in its last line",
+        ) from error
+    if not isinstance(record, dict) or record.get("schema") != SCHEMA:
+        found = record.get("schema") if isinstance(record, dict) else type(record).__name__
+        raise ResultError(
+            "The results have another schema", where=path, expected=SCHEMA, found=found, fix=AGAIN
+        )
+    if not (folder / FRAME).is_file():
+        raise ResultError(
+            "The results lack the frame that they are of", where=folder, expected=FRAME, fix=AGAIN
+        )
+    return StoredResult(folder, record)
+
+
+def _read_mesh(path: Path) -> trimesh.Trimesh:
+    import trimesh
+
+    try:
+        mesh = trimesh.load_mesh(path, process=False)
+        mesh.metadata["_ply_raw"]["vertex"]["data"]["uncertainty"]
+    except (OSError, KeyError, ValueError, IndexError) as error:
+        raise ResultError(
+            "A mesh of the results cannot be read",
+            where=path,
+            expected="a PLY with the scalar `uncertainty` on its vertices, as brrp writes it",
+            found=error,
+            fix=AGAIN,
+        ) from error
+    return mesh

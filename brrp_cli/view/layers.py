@@ -1,0 +1,124 @@
+"""What is drawn of a result: meshes, observed points, collision shapes."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brrp_cli.frames.frame import BACKGROUND, Frame
+from brrp_cli.geometry import project, transform_points
+from brrp_cli.methods.base import Surface
+from brrp_cli.surface.colours import spread
+from brrp_cli.surface.stored import StoredResult
+
+if TYPE_CHECKING:
+    import trimesh
+
+# A vertex has the colour of its pixel if the depth there is this close to its own, metres.
+SEEN_WITHIN = 0.012
+# Of what is no object, points further than this from the objects' box are left out, metres.
+SURROUNDINGS = 0.25
+MOST_POINTS = 120_000
+PLAN_SCENE = "scene.glb"
+
+
+def seen_colours(vertices: NDArray[np.floating], frame: Frame, object_id: int) -> NDArray[np.uint8]:
+    """Colours (n, 3) of vertices (n, 3), metres, camera frame: of the pixel that saw the vertex,
+    else the object's median colour."""
+    mask = frame.segmap == object_id
+    typical = np.median(frame.rgb[mask], axis=0) if mask.any() else np.full(3, 128)
+    colours = np.tile(np.asarray(typical, dtype=np.uint8), (len(vertices), 1))
+    in_front = np.flatnonzero(vertices[:, 2] > 0)
+    height, width = frame.shape
+    u, v = np.rint(project(vertices[in_front], frame.K)).astype(np.int64).T
+    inside = (u >= 0) & (u < width) & (v >= 0) & (v < height)
+    index, u, v = in_front[inside], u[inside], v[inside]
+    depth = frame.points[v, u, 2]
+    with np.errstate(invalid="ignore"):
+        seen = mask[v, u] & (np.abs(depth - vertices[index, 2]) < SEEN_WITHIN)
+    colours[index[seen]] = frame.rgb[v[seen], u[seen]]
+    return colours
+
+
+def observed_points(
+    stored: StoredResult, object_id: int
+) -> tuple[NDArray[np.float32], NDArray[np.uint8]]:
+    """Points (n, 3) of one id, metres, frame of the meshes, and their colours (n, 3); of the
+    background those around the objects. Some of them where there are many."""
+    frame = stored.frame
+    stride = point_stride(frame)
+    chosen = np.zeros(frame.shape, dtype=bool)
+    chosen[::stride, ::stride] = (frame.valid & (frame.segmap == object_id))[::stride, ::stride]
+    points, colours = frame.points[chosen], frame.rgb[chosen]
+    if object_id == BACKGROUND:
+        objects = frame.points[frame.valid & (frame.segmap != BACKGROUND)]
+        if len(objects):
+            low, high = objects.min(axis=0) - SURROUNDINGS, objects.max(axis=0) + SURROUNDINGS
+            near = ((points >= low) & (points <= high)).all(axis=1)
+            points, colours = points[near], colours[near]
+    moved = transform_points(stored.T_frame_cam, points)
+    return np.asarray(moved, dtype=np.float32), colours
+
+
+def point_stride(frame: Frame) -> int:
+    """Every so many rows and columns are shown, so that they are about `MOST_POINTS` points."""
+    return max(1, round(float(np.sqrt(frame.segmap.size / MOST_POINTS))))
+
+
+def page_glb(stored: StoredResult) -> bytes:
+    """One GLB: `object_ID` with the colours that were seen and `_spread` on its vertices,
+    `points_ID`, and `plan_object_ID_part_I` where there are collision shapes."""
+    import trimesh
+
+    scene = trimesh.Scene()
+    T_cam_frame = np.linalg.inv(stored.T_frame_cam)
+    for object_id, surface in stored.surfaces.items():
+        colours = seen_colours(
+            transform_points(T_cam_frame, surface.vertices), stored.frame, object_id
+        )
+        _add(scene, f"object_{object_id}", _as_mesh(surface, colours))
+    for object_id in [BACKGROUND, *stored.frame.object_ids]:
+        points, colours = observed_points(stored, object_id)
+        if len(points):
+            _add(scene, f"points_{object_id}", trimesh.PointCloud(points, colours))
+    for name, part in collision_parts(stored).items():
+        _add(scene, f"plan_{name}", part)
+    if not scene.geometry:
+        return b""
+    return bytes(scene.export(file_type="glb"))
+
+
+def collision_parts(stored: StoredResult, folder: str = "plan") -> dict[str, trimesh.Trimesh]:
+    """The convex parts that `brrp export` wrote into the results, by name, in the frame of the
+    meshes."""
+    import trimesh
+
+    path: Path = stored.folder / folder / PLAN_SCENE
+    if not path.is_file():
+        return {}
+    scene = trimesh.load_scene(path)
+    parts = {}
+    for name in scene.graph.nodes_geometry:
+        T, geometry = scene.graph[name]
+        if name.startswith("object_"):
+            parts[str(name)] = scene.geometry[geometry].copy().apply_transform(T)
+    return parts
+
+
+def _as_mesh(surface: Surface, colours: NDArray[np.uint8]) -> trimesh.Trimesh:
+    import trimesh
+
+    return trimesh.Trimesh(
+        surface.vertices,
+        surface.faces,
+        vertex_colors=colours,
+        vertex_attributes={"_spread": spread(surface).astype(np.float32)},
+        process=False,
+    )
+
+
+def _add(scene: trimesh.Scene, name: str, geometry: Any) -> None:
+    scene.add_geometry(geometry, node_name=name, geom_name=name)

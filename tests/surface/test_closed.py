@@ -1,0 +1,80 @@
+"""Any occupancy: a closed, outward, finite mesh in metres, no mesh, or an error of ours."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+import trimesh
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as hnp
+
+from brrp_cli.config import SurfaceConfig
+from brrp_cli.errors import BrrpError
+from brrp_cli.methods.base import METRES
+from brrp_cli.surface.extract import extract_surface
+
+SPACING = SurfaceConfig().spacing
+CELLS = 7
+SIDE = SPACING * (CELLS - 1)
+
+
+@dataclass
+class Lattice:
+    """A posterior that is given on the lattice that will be asked for."""
+
+    values: np.ndarray
+    doubt: float = 0.01
+
+    @property
+    def bounds(self) -> np.ndarray:
+        return np.array([[0.1, -0.2, 0.7], [0.1 + SIDE, -0.2 + SIDE, 0.7 + SIDE]])
+
+    surface_unit = METRES
+
+    def probability_volume(self, axes) -> np.ndarray:
+        assert [len(axis) for axis in axes] == [CELLS] * 3
+        return self.values
+
+    def surface_uncertainty(self, vertices) -> np.ndarray:
+        return np.full(len(vertices), self.doubt, np.float32)
+
+
+OBSERVED = np.array([[0.1, -0.2, 0.7]]) + SIDE / 2
+
+
+@settings(deadline=None, max_examples=150)
+@given(
+    values=hnp.arrays(
+        np.float32,
+        (CELLS,) * 3,
+        elements=st.sampled_from([0.0, 0.25, 0.5, 0.75, 1.0]) | st.floats(0, 1, width=32),
+        fill=st.sampled_from([0.0, 1.0]),
+    )
+)
+def test_any_occupancy_gives_a_closed_outward_mesh_or_none(values: np.ndarray) -> None:
+    surface = extract_surface(Lattice(values), OBSERVED, SurfaceConfig())
+    if surface is None:
+        return
+    # As it is written and read: single precision.
+    mesh = trimesh.Trimesh(surface.vertices.astype(np.float32), surface.faces, process=False)
+    assert np.isfinite(mesh.vertices).all() and np.isfinite(surface.uncertainty).all()
+    assert mesh.is_watertight and mesh.is_winding_consistent
+    assert mesh.volume > 0
+    low, high = Lattice(values).bounds
+    assert (mesh.vertices >= low - SPACING - 1e-6).all()
+    assert (mesh.vertices <= high + SPACING + 1e-6).all()
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
+def test_an_occupancy_that_is_no_number_never_becomes_a_mesh(bad: float) -> None:
+    values = np.zeros((CELLS,) * 3, np.float32)
+    values[2:5, 2:5, 2:5] = 1
+    assert extract_surface(Lattice(values), OBSERVED, SurfaceConfig()) is not None
+    with pytest.raises(BrrpError, match="surface gave numbers that are NaN"):
+        extract_surface(Lattice(values, doubt=bad), OBSERVED, SurfaceConfig())
+    values[0, 0, 0] = bad
+    with pytest.raises(BrrpError, match="posterior gave numbers that are NaN"):
+        extract_surface(Lattice(values), OBSERVED, SurfaceConfig())

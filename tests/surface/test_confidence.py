@@ -1,0 +1,158 @@
+"""The surface that holds an object with a given probability, against posteriors in closed form."""
+
+import numpy as np
+import pytest
+import trimesh
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+from made_result import posterior_on
+
+from brrp_cli.config import SurfaceConfig
+from brrp_cli.inference.particles import particle_volumes
+from brrp_cli.surface.confidence import confidence_level, confidence_surface
+from brrp_cli.surface.extract import extract_surface, lattice_axes
+
+CENTER = np.array([0.1, -0.05, 0.8])
+RADIUS, WIDTH = 0.03, 0.003
+CONFIG = SurfaceConfig(level=0.5, spacing=0.003)
+
+
+def ball(center=CENTER, radius=RADIUS, width=WIDTH):
+    """Logits of a ball whose radius is logistic with scale `width`."""
+    return lambda points: (radius - np.linalg.norm(points - center, axis=1)) / width
+
+
+def box(half_width):
+    return np.stack([CENTER - half_width, CENTER + half_width])
+
+
+def logit(p):
+    return np.log(p / (1 - p))
+
+
+def reach(surface, center=CENTER):
+    """Mean distance of the vertices from a centre."""
+    return np.linalg.norm(surface.vertices - center, axis=1).mean()
+
+
+@pytest.mark.parametrize("confidence", [0.6, 0.9, 0.95, 0.99])
+def test_one_particle_has_its_quantile(confidence):
+    """A ball of logistic radius lies within the radius r + s logit(c) with probability c."""
+    posterior = posterior_on([ball()], box(0.06), spacing=0.0015)
+    found = confidence_surface(posterior, CENTER[None] + [0.03, 0, 0], confidence, CONFIG)
+    assert found.level == pytest.approx(1 - confidence, rel=0.1)
+    assert reach(found) == pytest.approx(RADIUS + WIDTH * logit(confidence), abs=5e-4)
+    assert found.bounded and found.confidence == confidence
+
+
+def test_what_each_point_allows_is_too_little_for_the_whole():
+    """Eight equally probable balls at eight places: a point outside of the level set at 1 - c may
+    still be occupied with probability 8 (1 - c) in one of them, and any one of them may be it."""
+    shifts = 0.05 * np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
+    centers = CENTER + shifts
+    posterior = posterior_on([ball(c, 0.02) for c in centers], box(0.09), which=np.arange(8))
+    confidence = 0.9
+    found = confidence_surface(posterior, centers + [0.02, 0, 0], confidence, CONFIG)
+    # Outside of C_t each ball has at most 8 t; all of them together are missed with 8 t.
+    assert found.level == pytest.approx((1 - confidence) / 8, rel=0.1)
+    away = np.linalg.norm(found.vertices[:, None] - centers, axis=2).min(axis=1)
+    assert away.mean() == pytest.approx(0.02 + WIDTH * logit(confidence), abs=5e-4)
+    pointwise = 0.02 + WIDTH * logit(1 - 8 * (1 - confidence))
+    assert away.mean() - pointwise > 0.004
+
+
+@pytest.mark.parametrize("confidence", [0.8, 0.95])
+def test_drawn_shapes_lie_inside_as_often_as_it_says(confidence):
+    """O = {p_i > u}, drawn 20,000 times on the lattice."""
+    rng = np.random.default_rng(0)
+    functions = [ball(CENTER + rng.normal(0, 0.006, 3), 0.025, w) for w in (0.001, 0.002, 0.004)]
+    posterior = posterior_on(functions, box(0.07), which=(0, 1, 1, 2))
+    volumes = particle_volumes(posterior, lattice_axes(posterior.bounds, 0.003)).reshape(4, -1)
+    level = confidence_level(volumes, confidence)
+    outside = volumes.mean(axis=0) < level
+    which, u = rng.integers(4, size=20_000), rng.random(20_000)
+    inside = volumes[:, outside].max(axis=1)[which] <= u
+    assert inside.mean() >= confidence - 0.01
+    assert inside.mean() <= confidence + 0.03, "no smaller region would do"
+
+
+@settings(deadline=None)
+@given(
+    arrays(np.float32, (3, 40), elements=st.floats(0, 1, width=32)),
+    st.floats(0.5, 0.999),
+)
+def test_the_level_is_the_largest_that_holds(volumes, confidence):
+    mean = volumes.mean(axis=0)
+
+    def missed(level):
+        outside = mean < level
+        return volumes[:, outside].max(axis=1).mean() if outside.any() else 0.0
+
+    level = confidence_level(volumes, confidence)
+    allowed = 1 - confidence
+    if level is None:
+        assert volumes.max(axis=1).mean() <= allowed + 1e-5
+        return
+    assert missed(level) <= allowed + 1e-5
+    higher = mean[mean > level]
+    if len(higher):
+        assert missed(higher.min()) >= allowed - 1e-5
+    # Never more than what each point allows alone.
+    assert (mean[mean < level] <= allowed + 1e-5).all()
+
+
+def test_it_is_closed_and_holds_the_mesh_and_grows():
+    posterior = posterior_on([ball(), ball(radius=0.035)], box(0.07), which=(0, 1, 1))
+    observed = CENTER[None] + [0.03, 0, 0]
+    inner = extract_surface(posterior, observed, CONFIG)
+    for confidence in (0.7, 0.9, 0.97):
+        outer = confidence_surface(posterior, observed, confidence, CONFIG)
+        mesh = trimesh.Trimesh(outer.vertices, outer.faces, process=False)
+        assert mesh.is_watertight and mesh.volume > 0
+        assert (posterior.probability(inner.vertices) > outer.level).all()
+        assert reach(outer) > reach(inner)
+        inner = outer
+
+
+def test_the_end_of_the_map_is_told():
+    posterior = posterior_on([ball()], box(0.035))
+    found = confidence_surface(posterior, CENTER[None] + [0.03, 0, 0], 0.99, CONFIG)
+    assert not found.bounded
+    assert trimesh.Trimesh(found.vertices, found.faces, process=False).is_watertight
+
+
+def test_nothing_is_left_of_an_object_that_is_probably_nowhere():
+    def nowhere(points):
+        return np.full(len(points), -5.0)
+
+    posterior = posterior_on([nowhere], box(0.03))
+    assert confidence_surface(posterior, CENTER[None], 0.9, CONFIG) is None
+
+
+def test_particles_average_to_the_posterior():
+    posterior = posterior_on([ball(), ball(radius=0.02)], box(0.05), which=(0, 1, 1))
+    axes = lattice_axes(posterior.bounds, 0.005)
+    volumes = particle_volumes(posterior, axes)
+    assert len(volumes) == 3
+    np.testing.assert_allclose(volumes.mean(axis=0), posterior.probability_volume(axes), atol=1e-6)
+
+
+def test_a_margin_grows_it_but_not_into_space_that_was_seen_to_be_empty():
+    posterior = posterior_on([ball()], box(0.05))
+    observed = CENTER[None] + [0.03, 0, 0]
+    margin, confidence = 0.02, 0.9
+
+    def empty(points):
+        return points[:, 0] > CENTER[0]
+
+    plain = confidence_surface(posterior, observed, confidence, CONFIG)
+    grown = confidence_surface(posterior, observed, confidence, CONFIG, margin, empty)
+    x, radius = (grown.vertices - CENTER)[:, 0], np.linalg.norm(grown.vertices - CENTER, axis=1)
+    # Two lattice steps from the border between the two halves each keeps to its own rule.
+    assert radius[x > 0.006].mean() == pytest.approx(reach(plain), abs=5e-4)
+    assert radius[x < -0.006].mean() == pytest.approx(reach(plain) + margin, abs=0.002)
+    assert radius.max() > 0.05, "it goes on where the posterior's box ends"
+    mesh = trimesh.Trimesh(grown.vertices, grown.faces, process=False)
+    assert mesh.is_watertight and mesh.volume > 0
+    assert grown.level == plain.level and grown.bounded
