@@ -18,10 +18,11 @@ COMMANDS = {
     "info": ("info", "Show what a prior holds and how it was made."),
     "verify": ("verify", "Check every byte of a prior."),
     "frame": ("frame", "Turn colour and depth images into a frame; find the objects."),
-    "reconstruct": ("reconstruct", "Turn a segmented RGBD frame into a closed mesh per object."),
+    "segment": ("segment", "Make masks, show them, and correct them by id."),
+    "reconstruct": ("reconstruct", "Turn an RGBD frame into a closed mesh per object."),
     "view": ("view", "Look at results in one HTML page, offline."),
     "export": ("export", "Turn results into collision shapes: URDF, MJCF, a cuRobo world."),
-    "fetch": ("fetch", "Bring CLIP, which retrieves objects by their look."),
+    "fetch": ("fetch", "Bring CLIP, or the models that make masks by a prompt."),
     "eval": ("eval", "Measure methods on scenes whose truth is known."),
     "demo": ("demo", "Run the whole path on a made scene and score it."),
 }

@@ -81,6 +81,10 @@ class RetrievalError(BrrpError):
     """Retrieval cannot run: a model is missing or not the right one."""
 
 
+class MaskError(BrrpError):
+    """Masks cannot be made: a model is missing or not the right one."""
+
+
 class WeightsError(BrrpError):
     """A learned method's weights are missing, damaged, or of something else."""
 

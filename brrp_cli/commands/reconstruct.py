@@ -1,4 +1,4 @@
-"""`brrp reconstruct FRAME.npz`: a closed mesh of every object, and how sure that is."""
+"""`brrp reconstruct SOURCE`: a closed mesh of every object, and how sure that is."""
 
 from __future__ import annotations
 
@@ -11,7 +11,9 @@ import click
 from click.core import ParameterSource
 
 from brrp_cli.commands.export import CONFIDENCE, export
+from brrp_cli.commands.frame import refuse_existing
 from brrp_cli.commands.retriever_option import RetrieverName
+from brrp_cli.commands.source_options import SourceOptions, source_options
 from brrp_cli.commands.weights_option import check_weights
 from brrp_cli.config import PRESETS, preset
 from brrp_cli.methods.registry import METHODS, RECONSTRUCTING
@@ -24,6 +26,7 @@ from brrp_cli.retrieval.clip_files import CLIP_DIR_VARIABLE
 if TYPE_CHECKING:
     from brrp_cli.api import Reconstruction
     from brrp_cli.config import Config
+    from brrp_cli.frames.frame import Frame
     from brrp_cli.prior.store import Prior
     from brrp_cli.retrieval.base import Retriever
 
@@ -34,9 +37,9 @@ OF_A_PRIOR = ("prior_path", "preset_name", "k", "retriever", "clip_dir")
 
 
 @click.command("reconstruct")
-@click.argument("frame_path", metavar="FRAME.npz", type=click.Path(path_type=Path))
+@source_options
 @click.option("--prior", "prior_path", type=click.Path(path_type=Path), help="The prior to use.")
-@click.option("-o", "--output", type=click.Path(path_type=Path), help="[default: FRAME_METHOD/]")
+@click.option("-o", "--output", type=click.Path(path_type=Path), help="[default: SOURCE_METHOD/]")
 @click.option(
     "--method",
     type=click.Choice(list(RECONSTRUCTING)),
@@ -64,7 +67,6 @@ OF_A_PRIOR = ("prior_path", "preset_name", "k", "retriever", "clip_dir")
     help=f"Folder with CLIP ViT-B/16 as ONNX. [default: {CLIP_DIR_VARIABLE}, else the fetched]",
 )
 @click.option("--frame", "coordinates", type=click.Choice(["camera", "world"]), default="camera")
-@click.option("--depth-scale", type=float, help="Raw depth times this is metres.")
 @click.option("--seed", type=int, default=0, show_default=True)
 @click.option("--device", type=click.Choice(["auto", "cpu", "cuda"]), default="auto")
 @click.option(
@@ -81,7 +83,7 @@ OF_A_PRIOR = ("prior_path", "preset_name", "k", "retriever", "clip_dir")
 )
 @click.option("--overwrite", is_flag=True, help="Replace the output folder if it is there.")
 def command(
-    frame_path: Path,
+    source: SourceOptions,
     prior_path: Path | None,
     output: Path | None,
     method: str,
@@ -91,14 +93,17 @@ def command(
     retriever: str,
     clip_dir: Path | None,
     coordinates: str,
-    depth_scale: float | None,
     seed: int,
     device: str,
     collision: str,
     confidence: float | None,
     overwrite: bool,
 ) -> None:
-    """Turn a segmented RGBD frame into a closed mesh for every object.
+    """Turn an RGBD frame into a closed mesh for every object.
+
+    SOURCE is a frame file or anything else that `brrp frame` reads; or name the images of one
+    frame. Where there are no masks they are made: by --prompt, else without a model. A picture of
+    them is written beside the output; `brrp segment OUT/frame.npz` corrects them.
 
     The prior is --prior, else BRRP_PRIOR, else the one in the user's data folder, else the
     starter prior; --method vprism and pointsdf have none. Meshes are in metres, in the camera frame
@@ -107,25 +112,28 @@ def command(
     \b
     Example:
       brrp reconstruct frame.npz
+      brrp reconstruct --color c.png --depth d.png --intrinsics k.json
       brrp reconstruct frame.npz --prior prior/ --preset paper -o out/ --seed 1
       brrp reconstruct frame.npz --method vprism
       brrp reconstruct frame.npz --method pointsdf --weights prior.safetensors
       brrp reconstruct frame.npz --collision coacd --confidence 0.95
     """
     from brrp_cli.api import reconstruct
-    from brrp_cli.frames.readers import read_frame
     from brrp_cli.surface.results import check_output, write_results
     from brrp_cli.surface.stored import open_result
 
+    source.check()
     check_weights([method], [] if weights is None else [weights])
     check_collision(collision, confidence)
     uses_prior = METHODS[method].uses_prior
     if not uses_prior:
         refuse_options(method, device)
-    output = output or frame_path.with_name(f"{frame_path.stem}_{method}")
+    output = output or source.name.with_name(f"{source.name.name}_{method}")
     # What can be refused is refused before the work, not after it.
-    frame = read_frame(frame_path, depth_scale=depth_scale)
+    frame = source.read()
     check_output(output, frame, coordinates, overwrite=overwrite)
+    if source.prompt is not None or not frame.object_ids:
+        frame = make_masks(source, frame, output, seed, overwrite=overwrite)
     config = preset(preset_name)
     config = replace(config, k=k) if k else config
     prior, chosen = None, None
@@ -157,6 +165,28 @@ def command(
         export(open_result(output), None, options, overwrite=False)
     if done < len(result.objects):
         sys.exit(SOME_FAILED)
+
+
+def make_masks(
+    source: SourceOptions, frame: Frame, output: Path, seed: int, *, overwrite: bool
+) -> Frame:
+    """The frame with masks made on the way; a picture of them is written beside the output."""
+    from brrp_cli.frames.build import require_objects
+    from brrp_cli.frames.picture import write_picture
+
+    if source.masks is not None:
+        return require_objects(frame)
+    picture = output.with_name(output.name + ".masks.png")
+    refuse_existing([picture], overwrite)
+    frame = require_objects(source.make_masks(frame, seed))
+    write_picture(frame, picture)
+    how = f"the prompt {source.prompt!r}" if source.prompt else "what stands on the table"
+    note(f"Masks: made on the way from {how}, {len(frame.object_ids)} objects: {picture}")
+    note(
+        f"  to correct them: brrp segment {output / 'frame.npz'} --merge 1,2 --split 3 --drop 4"
+        " -o NEW.npz"
+    )
+    return frame
 
 
 def check_collision(collision: str, confidence: float | None) -> None:

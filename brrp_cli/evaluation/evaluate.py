@@ -176,7 +176,8 @@ def find_data_root(scenes: Sequence[Scene], folder: Path) -> Path:
     is none, which reading the mesh will tell."""
     first = next((o.mesh_path for scene in scenes for o in scene.objects), "")
     folder = folder.resolve()
-    for candidate in (folder, folder / "data", folder.parent / "data", folder.parent):
+    near = (folder, folder / "data", folder.parent / "data", folder.parent, folder.parent.parent)
+    for candidate in near:
         if (candidate / first).is_file():
             return candidate
     return folder

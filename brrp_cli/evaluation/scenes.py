@@ -1,6 +1,6 @@
 """Scenes with ground truth, read from disk.
 
-Two layouts, which may stand side by side in one folder:
+Two layouts, which may stand side by side in one folder (and BOP's data sets, see bop_scenes):
 
 - the published one: a folder for each scene with `objects.json` and one folder for each view
   (`rgb.jpg`, `depth.npy`, `camera.npz`, `seg_mask.npy`);
@@ -13,8 +13,10 @@ Poses are in the world frame of the views' `T_world_cam`.
 from __future__ import annotations
 
 import logging
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 
@@ -30,6 +32,8 @@ OBJECTS_FILE = "objects.json"
 TRUTH_SUFFIX = ".truth.json"
 
 log = logging.getLogger(__name__)
+
+T = TypeVar("T")
 
 
 @dataclass(frozen=True)
@@ -56,7 +60,7 @@ class Scene:
                 found=index,
             )
         path = self.views[index]
-        frame = read_published(path) if path.is_dir() else load_frame(path)
+        frame = self.read(path)
         if frame.T_world_cam is None:
             raise FrameError(
                 "The frame has no camera pose, so that the true objects cannot be placed in it",
@@ -65,6 +69,10 @@ class Scene:
                 found="none",
             )
         return self._keep_known_ids(frame)
+
+    def read(self, path: Path) -> Frame:
+        """The frame of one of `views`. Errors: FrameError."""
+        return read_published(path) if path.is_dir() else load_frame(path)
 
     def _keep_known_ids(self, frame: Frame) -> Frame:
         known = [o.id for o in self.objects]
@@ -103,22 +111,33 @@ def find_scenes(folder: Path, select: slice | None = None) -> list[Scene]:
     """
     paths = _scene_paths(folder)
     if not paths:
+        # It makes scenes of the kind that is defined here.
+        from brrp_cli.evaluation.bop_scenes import bop_scenes
+
+        if found := bop_scenes(folder):
+            return [*_chosen(found, select, folder)]
+    if not paths:
         raise SceneError(
             "No scene found",
             where=folder,
-            expected=f"folders with {OBJECTS_FILE}, or NAME.npz with NAME{TRUTH_SUFFIX} beside it",
+            expected=f"folders with {OBJECTS_FILE}, NAME.npz with NAME{TRUTH_SUFFIX} beside it, or"
+            " a BOP data set",
             found=_listing(folder),
             fix="name the folder that holds the scenes; tools/make_scenes.py makes some",
         )
-    chosen = paths[select or slice(None)]
+    return [_read_scene(path) for path in _chosen(paths, select, folder)]
+
+
+def _chosen(items: Sequence[T], select: slice | None, folder: Path) -> list[T]:
+    chosen = list(items[select or slice(None)])
     if not chosen and select is not None:
         raise SceneError(
             "The selection holds no scene",
             where=folder,
-            expected=f"a part of 0:{len(paths)}",
+            expected=f"a part of 0:{len(items)}",
             found=f"{select.start}:{select.stop}",
         )
-    return [_read_scene(path) for path in chosen]
+    return chosen
 
 
 def _scene_paths(folder: Path) -> list[Path]:

@@ -25,12 +25,14 @@ class TrueObject:
 
     id : its value in the masks
     mesh_path : relative to the data root
-    T_world_object : (4, 4) similarity, the mesh file's coordinates to world metres
+    T_world_object : (4, 4) similarity, the mesh's coordinates to world metres
+    unit : metres that one unit of the mesh file is
     """
 
     id: int
     mesh_path: str
     T_world_object: NDArray[np.float64]
+    unit: float = 1.0
 
     @property
     def name(self) -> str:
@@ -91,6 +93,7 @@ def true_mesh(true_object: TrueObject, data_root: Path | None) -> Any:
         raise SceneError("An object's true mesh does not load", where=path, found=error) from error
     if len(mesh.faces) == 0:
         raise SceneError("An object's true mesh has no faces", where=path)
+    mesh.apply_scale(true_object.unit)
     mesh.apply_transform(true_object.T_world_object)
     return mesh
 

@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+import logging
 from pathlib import Path
+
+import numpy as np
 
 from brrp_cli.errors import FrameError
 from brrp_cli.frames.build import make_frame
 from brrp_cli.frames.frame import Frame
 from brrp_cli.frames.intrinsics import Intrinsics, read_intrinsics
 from brrp_cli.frames.pixels import read_colour, read_depth, read_masks
+
+log = logging.getLogger(__name__)
 
 # What makers of intrinsics files write for millimetres: metres (RealSense), millimetres (BOP),
 # units to the metre.
@@ -43,7 +48,15 @@ def read_images(
         _same_size(shape, camera.shape, intrinsics)
     if depth_scale is None and raw.dtype.kind in "iu":
         _millimetres(camera, intrinsics)
-    return make_frame(rgb, ids, depth=raw, K=camera.K, depth_scale=depth_scale, source=depth)
+    frame = make_frame(rgb, ids, depth=raw, K=camera.K, depth_scale=depth_scale, source=depth)
+    unit = "millimetres" if raw.dtype.kind in "iu" else "metres"
+    log.info(
+        "Depth: %s, taken as %s (median %.2f m); --depth-scale says otherwise",
+        raw.dtype,
+        unit if depth_scale is None else f"units of {depth_scale:g} m",
+        float(np.median(frame.points[frame.valid][:, 2])),
+    )
+    return frame
 
 
 def _same_size(color: tuple[int, ...], other: tuple[int, ...], path: Path) -> None:

@@ -45,11 +45,14 @@ def load_frame(path: str | Path, *, depth_scale: float | None = None, masks: boo
             fix="save the arrays under these names"
             + ("" if has_masks else ", or find the objects with `brrp frame --segment`"),
         )
+    K = arrays.get("K")
+    if K is not None and K.shape == (9,):  # contact_graspnet takes it flat too
+        K = K.reshape(3, 3)
     frame = make_frame(
         arrays.get("rgb"),
         arrays.get("segmap", arrays.get("seg")),
         depth=arrays["depth"] if has_depth else None,
-        K=arrays.get("K"),
+        K=K,
         xyz=None if has_depth else arrays["xyz"],
         T_world_cam=arrays.get("T_world_cam"),
         depth_scale=depth_scale,

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
+from brrp_cli.errors import OutputError
 from brrp_cli.files import atomic_path
 from brrp_cli.frames.frame import BACKGROUND, Frame
 
@@ -64,6 +65,22 @@ def write_picture(frame: Frame, path: Path) -> None:
     """Write `draw_masks` of the frame as an image file. Errors: OutputError."""
     with atomic_path(path) as partial:
         Image.fromarray(draw_masks(frame.rgb, frame.segmap)).save(partial)
+
+
+def write_ids(frame: Frame, path: Path) -> None:
+    """Write the ids as a 16-bit grey PNG, 0 = background, as `--masks` reads them.
+
+    Errors: OutputError, also for ids that 16 bits do not hold.
+    """
+    if frame.segmap.min() < 0 or frame.segmap.max() >= 2**16:
+        raise OutputError(
+            "An id does not fit a 16-bit image",
+            where=path,
+            expected="0 to 65535",
+            found=f"{frame.segmap.min()} to {frame.segmap.max()}",
+        )
+    with atomic_path(path) as partial:
+        Image.fromarray(frame.segmap.astype(np.uint16)).save(partial)
 
 
 def _outline(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:

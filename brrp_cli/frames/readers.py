@@ -2,49 +2,56 @@
 
 from __future__ import annotations
 
+import importlib
+import pkgutil
+from functools import cache
 from pathlib import Path
-from typing import Protocol
 
 from brrp_cli.errors import FrameError
-from brrp_cli.frames import brrp_real, published
+from brrp_cli.frames import formats
+from brrp_cli.frames.format import Format, Request
 from brrp_cli.frames.frame import Frame
-from brrp_cli.frames.npz import load_frame
 
 
-class FolderReader(Protocol):
-    """Reads a folder of one layout."""
-
-    def __call__(self, folder: Path, *, depth_scale: float | None) -> Frame:
-        """The folder's frame. Errors: FrameError."""
-
-
-# Layout -> (the files that tell it, its reader).
-_FOLDERS: dict[str, tuple[tuple[str, ...], FolderReader]] = {
-    "BRRP's real scene": (brrp_real.FILES, brrp_real.read_brrp_real),
-    "a view of a published scene": (published.FILES, published.read_published),
-}
+@cache
+def known_formats() -> tuple[Format, ...]:
+    """Every format that has a file in `brrp_cli/frames/formats`, by the file's name."""
+    names = sorted(module.name for module in pkgutil.iter_modules(formats.__path__))
+    modules = [importlib.import_module(f"{formats.__name__}.{name}") for name in names]
+    return tuple(module.FORMAT for module in modules)
 
 
-def read_frame(path: str | Path, *, depth_scale: float | None = None) -> Frame:
-    """Read a frame file (.npz, with or without masks), or a folder of a known layout.
+def read_frame(
+    path: str | Path, *, depth_scale: float | None = None, request: Request | None = None
+) -> Frame:
+    """Read a frame file (.npz, with or without masks), or a frame of any other known format.
 
     depth_scale : raw depth x depth_scale = metres, for files that do not tell their unit
+    request : all else that a user may ask for
 
-    Errors: FrameError, with the layouts that are known where the path is none of them.
+    Errors: FrameError, with the formats that are known where the path is of none or of several.
     """
     path = Path(path)
-    if not path.is_dir():
-        return load_frame(path, depth_scale=depth_scale, masks=False)
-    for files, read in _FOLDERS.values():
-        if all((path / name).is_file() for name in files):
-            return read(path, depth_scale=depth_scale)
-    inside = sorted(child.name for child in path.iterdir())
+    request = request or Request(depth_scale=depth_scale)
+    if not path.exists():
+        raise FrameError("No such file or folder", where=path, fix="check the path")
+    found = [one for one in known_formats() if one.matches(path)]
+    if len(found) == 1:
+        return found[0].read(path, request)
+    if found:
+        raise FrameError(
+            "The path may be of several formats",
+            where=path,
+            found="; ".join(f"{one.title} ({one.layout})" for one in found),
+            fix="name one frame's files: --color C.png --depth D.png --intrinsics K.json",
+        )
+    inside = sorted(child.name for child in path.iterdir()) if path.is_dir() else [path.suffix]
     raise FrameError(
-        "The folder is none of the layouts that are known",
+        "The folder is none of the layouts that are known"
+        if path.is_dir()
+        else "The file is of no format that is known",
         where=path,
-        expected="; or ".join(
-            f"{name} ({', '.join(files)})" for name, (files, _) in _FOLDERS.items()
-        ),
+        expected="; or ".join(f"{one.title} ({one.layout})" for one in known_formats()),
         found=", ".join(inside[:12]) or "an empty folder",
         fix="for other images: `brrp frame --color C.png --depth D.png --intrinsics K.json"
         " -o FRAME.npz`",

@@ -1,8 +1,8 @@
-"""Object masks without a model: what stands on the table, apart in the image or on the table.
+"""Object masks without a model: what stands on the table, apart in depth.
 
-Pixels that rise above the table are split into fragments where the image shows a depth edge;
-fragments that stand on the same spot of the table are one object. Objects that touch come out
-as one.
+Depth is smoothed and freed of flying pixels. What rises above the table is cut at jumps of depth
+and at hollow creases, which is how things that touch meet; parts of which one is the inside of the
+other (a mug's walls) are joined again.
 """
 
 from __future__ import annotations
@@ -12,67 +12,108 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from brrp_cli.dependencies import import_library
 from brrp_cli.errors import FrameError
-from brrp_cli.frames.fragments import find_fragments, flying_pixels, grow, merge_by_footprint
+from brrp_cli.frames.creases import depth_jumps, hollow_creases, surface_normals
 from brrp_cli.frames.frame import BACKGROUND, Frame
+from brrp_cli.frames.grow import fill_holes, grow
 from brrp_cli.frames.inside import fill_inside
+from brrp_cli.frames.one_spot import join_on_one_spot
+from brrp_cli.frames.parts import absorb_small, find_parts, join_parts
+from brrp_cli.frames.smooth import flying_pixels, smooth_depth
 from brrp_cli.frames.table import find_table
+from brrp_cli.geometry import backproject
 
 
 @dataclass(frozen=True)
 class SegmentConfig:
     """Lengths are metres.
 
-    min_height : what rises less above the table, within a metre of the camera, is the table
-        (farther away this grows with the square of the distance, as depth noise does)
-    rim_height, reach : pixels higher than that join an object within `reach`
-    max_slope : steeper surface (depth over width) is taken for flying pixels
-    overlap : fragments whose footprints share that part of the smaller one are one object
+    min_height, max_height : what rises less above the table is the table. Between the two it is
+        `sigmas` deviations of the table's own height, which grow with the square of the distance
+    rim : pixels that rise that part of it join an object within `reach`
+    border : parts are joined where their common border is less of a boundary than that (0 to 1)
+    overlap : parts whose footprints share that part of the smaller one may be one object
     margin : how far beside the seen table an object may stand
     min_area : objects that show less of themselves are dropped, metres squared
     """
 
-    min_height: float = 0.012
-    rim_height: float = 0.010
+    min_height: float = 0.004
+    max_height: float = 0.015
+    sigmas: float = 3.5
+    rim: float = 0.7
     reach: float = 0.008
-    max_slope: float = 4.5
-    overlap: float = 0.12
+    border: float = 0.45
+    overlap: float = 0.3
     margin: float = 0.03
-    min_area: float = 0.0009
+    min_area: float = 0.0007
 
 
 def segment(frame: Frame, seed: int = 0, config: SegmentConfig | None = None) -> NDArray[np.int64]:
-    """Masks (H, W) of the objects that stand free on the table: 1, 2, ... from left to right.
+    """Masks (H, W) of the objects that stand on the table: 1, 2, ... from left to right.
 
-    The frame's own masks are not looked at; background, also behind the table, is 0.
+    The frame's own masks are not looked at; background, also behind the table, is 0, and so are
+    pixels without depth but for small holes inside an object.
 
     Errors: FrameError if there is no table or nothing stands on it.
     """
+    ndimage = import_library("scipy.ndimage")
     config = config or SegmentConfig()
-    valid = frame.valid
-    table = find_table(frame.points[valid], seed, frame.source)
-    points = np.where(valid[..., None], frame.points, np.nan)
+    raw = np.where(frame.valid, frame.points[..., 2], np.nan)
+    depth = smooth_depth(np.where(flying_pixels(raw), np.nan, raw))
+    points = backproject(depth, frame.K).astype(np.float64)
+    valid = np.isfinite(depth)
+    table = find_table(points[valid], seed, frame.source)
     height = table.plane.signed_distance(points)
     plan = table.plan(points)
-    lift = config.min_height * np.maximum(1.0, points[..., 2] ** 2)
+    lift = _lift(height, depth, config)
     with np.errstate(invalid="ignore"):
         on_table = np.zeros(frame.shape, dtype=bool)
         on_table[valid] = table.holds(plan[valid], config.margin)
         risen = on_table & (height > lift)
-        rim = on_table & (height > config.rim_height)
-    flying = flying_pixels(points[..., 2], frame.K, config.max_slope)
-    fragments = find_fragments(risen & ~flying)
-    segmap = merge_by_footprint(fragments, plan, config.overlap)
-    segmap = grow(segmap, points, rim, config.reach)
-    segmap = fill_inside(segmap, plan, on_table & (height > -lift))
+        rim = on_table & (height > config.rim * lift)
+        floor = on_table & (height > -config.max_height)
+    normals = surface_normals(points)
+    crease = hollow_creases(points, normals)
+    jumps = depth_jumps(depth, frame.K)
+    boundary = np.maximum(crease, jumps)
+    # Across a jump nothing meets, however the surfaces on both sides lie.
+    meets = np.where(ndimage.binary_dilation(jumps, iterations=2), 0.0, crease)
+    parts = find_parts(risen, boundary)
+    parts = join_parts(parts, boundary, config.border)
+    parts = join_on_one_spot(parts, plan, height, table.plan(normals), meets, config.overlap)
+    small = _areas(parts, frame) < config.min_area
+    segmap = absorb_small(parts, boundary, small)
+    # Pixels at edges, which were left out of the smoothed depth, join what they lie next to.
+    edges = frame.valid & ~valid & (table.plane.signed_distance(frame.points) > config.rim * lift)
+    points = np.where(edges[..., None], frame.points, points)
+    segmap = grow(segmap, points, rim | edges, config.reach)
+    segmap = fill_inside(segmap, table.plan(points), floor)
+    segmap = fill_holes(segmap, ~frame.valid)
     return _numbered(segmap, frame, config.min_area)
+
+
+def _lift(
+    height: NDArray[np.float64], depth: NDArray[np.float64], config: SegmentConfig
+) -> NDArray[np.float64]:
+    """(H, W) metres above which something has risen from the table at its depth (H, W)."""
+    flat = np.abs(height) < config.max_height
+    scaled = height[flat] / depth[flat] ** 2
+    # The median of deviations, times what makes it the deviation of a normal distribution.
+    deviation = 1.4826 * float(np.median(np.abs(scaled - np.median(scaled)))) if flat.any() else 0.0
+    depth = np.nan_to_num(depth, nan=float(np.nanmedian(depth)))
+    return np.clip(config.sigmas * deviation * depth**2, config.min_height, config.max_height)
+
+
+def _areas(segmap: NDArray[np.int64], frame: Frame) -> NDArray[np.float64]:
+    """(n + 1,) what each label shows of itself, metres squared, as if seen face on."""
+    area = np.nan_to_num(frame.points[..., 2] ** 2) / (frame.K[0, 0] * frame.K[1, 1])
+    return np.asarray(np.bincount(segmap.ravel(), weights=area.ravel()), dtype=np.float64)
 
 
 def _numbered(segmap: NDArray[np.int64], frame: Frame, min_area: float) -> NDArray[np.int64]:
     """The masks without small ones, numbered by the column of their middle."""
-    # What a pixel covers at its depth, seen face on.
-    area = np.nan_to_num(frame.points[..., 2] ** 2) / (frame.K[0, 0] * frame.K[1, 1])
-    areas = np.bincount(segmap.ravel(), weights=area.ravel())
+    areas = _areas(segmap, frame)
     columns = np.broadcast_to(np.arange(frame.shape[1]), frame.shape)
     middles = {
         int(i): float(columns[segmap == i].mean())

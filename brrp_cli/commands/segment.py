@@ -1,0 +1,121 @@
+"""`brrp segment`: masks made, shown, and corrected by id."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from brrp_cli.commands.frame import refuse_existing, tell
+from brrp_cli.commands.source_options import SourceOptions, source_options
+
+if TYPE_CHECKING:
+    from brrp_cli.frames.frame import Frame
+
+
+def _ids(ctx: click.Context, option: click.Parameter, values: tuple[str, ...]) -> list[list[int]]:
+    try:
+        return [[int(part) for part in value.split(",")] for value in values]
+    except ValueError:
+        raise click.BadParameter("ids are whole numbers with commas: 3,4", ctx, option) from None
+
+
+def _splits(
+    ctx: click.Context, option: click.Parameter, values: tuple[str, ...]
+) -> list[tuple[int, int]]:
+    found = []
+    for value in (part for text in values for part in text.split(",")):
+        object_id, _, pieces = value.partition(":")
+        try:
+            found.append((int(object_id), int(pieces or 2)))
+        except ValueError:
+            raise click.BadParameter("an id, or ID:PIECES: 5 or 5:3", ctx, option) from None
+        if found[-1][1] < 2:
+            raise click.BadParameter("at least two pieces", ctx, option)
+    return found
+
+
+@click.command("segment")
+@source_options
+@click.option("--again", is_flag=True, help="Make masks anew where the source has some.")
+@click.option(
+    "--split", "splits", multiple=True, callback=_splits, metavar="ID[:PIECES]", help="Cut in two."
+)
+@click.option(
+    "--merge", "merges", multiple=True, callback=_ids, metavar="ID,ID", help="Make them one."
+)
+@click.option("--drop", "drops", multiple=True, callback=_ids, metavar="ID", help="Forget them.")
+@click.option("--seed", default=0, show_default=True)
+@click.option("-o", "--output", type=click.Path(path_type=Path), required=True, help="FRAME.npz")
+@click.option("--overwrite", is_flag=True, help="Replace what stands at the output.")
+def command(
+    source: SourceOptions,
+    again: bool,
+    splits: list[tuple[int, int]],
+    merges: list[list[int]],
+    drops: list[list[int]],
+    seed: int,
+    output: Path,
+    overwrite: bool,
+) -> None:
+    """Make masks, show them, and correct them by the ids that the picture shows.
+
+    A source that has masks keeps them unless --again, --prompt or --masks says otherwise. All ids
+    are those of the masks before any correction; --split comes first, then --merge, then --drop.
+    Writes FRAME.npz, FRAME.masks.png to look at and FRAME.ids.png (16 bit) for other programs.
+
+    \b
+    Example:
+      brrp segment --color c.png --depth d.png --intrinsics k.json -o frame.npz
+      brrp segment frame.npz --merge 3,4 --split 5 --drop 2 -o frame.npz --overwrite
+      brrp segment scene/ --prompt "small object" -o frame.npz
+    """
+    source.check()
+    if output.suffix != ".npz":
+        raise click.UsageError(f"-o must end in .npz, not {output.name!r}")
+    if any(len(ids) < 2 for ids in merges):
+        raise click.UsageError("--merge takes two ids or more: --merge 3,4")
+    picture, ids = output.with_suffix(".masks.png"), output.with_suffix(".ids.png")
+    refuse_existing([output, picture, ids], overwrite)
+
+    from brrp_cli.frames import edit_masks
+    from brrp_cli.frames.build import require_objects
+    from brrp_cli.frames.npz import save_frame
+    from brrp_cli.frames.picture import write_ids, write_picture
+
+    frame = source.read()
+    if again or source.prompt is not None or not frame.object_ids:
+        frame = source.make_masks(frame, seed)
+    before = frame
+    for object_id, pieces in splits:
+        frame = replace(frame, segmap=edit_masks.split(frame, object_id, pieces, seed))
+    for group in merges:
+        frame = replace(frame, segmap=edit_masks.merge(frame, group))
+    for group in drops:
+        frame = replace(frame, segmap=edit_masks.drop(frame, group))
+    _report(require_objects(frame), before)
+    write_picture(frame, picture)
+    write_ids(frame, ids)
+    save_frame(frame, output)
+    tell(frame.shape, len(frame.object_ids), output, picture)
+
+
+def _report(frame: Frame, before: Frame) -> None:
+    """A line for each object: what it covers, how large it is, how far away."""
+    import numpy as np
+
+    click.echo("  id  pixels  with depth  width x height x depth, cm  distance, cm")
+    for object_id in frame.object_ids:
+        points = frame.object_points(object_id)
+        pixels = int((frame.segmap == object_id).sum())
+        size = "no depth"
+        distance = ""
+        if len(points):
+            extents = np.ptp(points, axis=0) * 100
+            size = " x ".join(f"{extent:.1f}" for extent in extents)
+            distance = f"{float(np.median(points[:, 2])) * 100:.0f}"
+        new = "" if object_id in before.object_ids else "  new"
+        share = f"{100 * len(points) / pixels:.0f} %"
+        click.echo(f"  {object_id:<3} {pixels:>6}  {share:>10}  {size:<26}  {distance:>12}{new}")

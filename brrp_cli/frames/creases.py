@@ -1,0 +1,73 @@
+"""Where one thing ends and another begins: jumps of depth, and creases that are hollow.
+
+What touches meets in a hollow crease (Stein et al., Object Partitioning using Local Convexity,
+CVPR 2014): a can on a table, two boxes side by side. Within one thing hollow creases are rarer.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+_REACH = 4  # pixels to each side, across which a crease is looked for
+_NORMAL_STEP = 2
+# Degrees between the normals of both sides: no crease, and surely one.
+_FLAT, _SHARP = 30.0, 60.0
+_NEAR = 0.05  # metres; sides farther apart are two surfaces, whatever their normals
+_STEEP = 6.0
+_JUMP = 0.008
+
+
+def surface_normals(points: Array) -> Array:
+    """Unit normals (H, W, 3), toward the camera, of points (H, W, 3); NaN beside missing ones."""
+    step = _NORMAL_STEP
+    padded = np.pad(points, ((step, step), (step, step), (0, 0)), constant_values=np.nan)
+    across = padded[step:-step, 2 * step :] - padded[step:-step, : -2 * step]
+    down = padded[2 * step :, step:-step] - padded[: -2 * step, step:-step]
+    normals = np.cross(down, across)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        normals /= np.linalg.norm(normals, axis=-1, keepdims=True)
+    return normals
+
+
+def hollow_creases(points: Array, normals: Array) -> Array:
+    """(H, W) from 0, none, to 1, a sharp hollow crease of points (H, W, 3), metres, at the pixel.
+
+    normals : (H, W, 3) unit, toward the camera
+    """
+    height, width = points.shape[:2]
+    pad = ((_REACH, _REACH), (_REACH, _REACH), (0, 0))
+    all_points = np.pad(points, pad, constant_values=np.nan)
+    all_normals = np.pad(normals, pad, constant_values=np.nan)
+    crease = np.zeros((height, width))
+    for down, right in ((0, _REACH), (_REACH, 0), (3, 3), (3, -3)):
+        sides = []
+        for sign in (1, -1):
+            row, column = _REACH + sign * down, _REACH + sign * right
+            window = np.s_[row : row + height, column : column + width]
+            sides.append((all_points[window], all_normals[window]))
+        (first, first_normal), (second, second_normal) = sides
+        between = first - second
+        with np.errstate(invalid="ignore"):
+            cosine = np.clip(np.sum(first_normal * second_normal, axis=-1), -1, 1)
+            hollow = np.sum((first_normal - second_normal) * between, axis=-1) < 0
+            near = np.linalg.norm(between, axis=-1) < _NEAR
+            sharp = (np.degrees(np.arccos(cosine)) - _FLAT) / (_SHARP - _FLAT)
+        crease = np.maximum(crease, np.where(hollow & near, np.nan_to_num(sharp), 0.0))
+    return np.clip(crease, 0.0, 1.0)
+
+
+def depth_jumps(depth: Array, K: Array) -> NDArray[np.bool_]:
+    """(H, W) pixels beside which depth (H, W), metres, jumps: steeper than a surface is seen."""
+    jumps = np.zeros(depth.shape, dtype=bool)
+    for axis, focal in ((0, K[1, 1]), (1, K[0, 0])):
+        near = np.moveaxis(depth, axis, 0)
+        marked = np.moveaxis(jumps, axis, 0)
+        with np.errstate(invalid="ignore"):
+            width = np.minimum(near[1:], near[:-1]) / focal
+            steep = np.abs(near[1:] - near[:-1]) > np.maximum(_STEEP * width, _JUMP)
+        marked[1:] |= steep
+        marked[:-1] |= steep
+    return jumps

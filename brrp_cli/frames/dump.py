@@ -1,0 +1,52 @@
+"""What recorders leave behind: folders of colour and depth images with one intrinsics file."""
+
+from __future__ import annotations
+
+import logging
+from pathlib import Path
+
+from brrp_cli.errors import FrameError
+from brrp_cli.frames.format import Request, pick
+from brrp_cli.frames.frame import Frame
+from brrp_cli.frames.images import read_images
+
+log = logging.getLogger(__name__)
+
+COLOUR_ENDINGS = (".png", ".jpg", ".jpeg")
+DEPTH_ENDINGS = (".png", ".tif", ".tiff", ".npy")
+
+
+def images_in(folder: Path, endings: tuple[str, ...]) -> dict[str, Path]:
+    """Stem -> file of the folder's images, by name."""
+    if not folder.is_dir():
+        return {}
+    files = sorted(path for path in folder.iterdir() if path.suffix.lower() in endings)
+    return {path.stem: path for path in files}
+
+
+def read_pair(
+    pairs: dict[str, tuple[Path, Path]], intrinsics: Path, request: Request, where: Path, unit: str
+) -> Frame:
+    """One of the pairs of colour and depth images; integers of depth are millimetres unless the
+    user says otherwise, which is said. Errors: FrameError.
+
+    pairs : name -> (colour, depth); unit : why millimetres are right, for the note
+    """
+    if not pairs:
+        raise FrameError(
+            "No colour image has a depth image of its name",
+            where=where,
+            expected="color/NAME.jpg and depth/NAME.png",
+        )
+    names = list(pairs)
+    colour, depth = pairs[pick(names, request.index, names, where)]
+    intrinsics = request.intrinsics or intrinsics
+    log.info("Frame: %s and %s, intrinsics %s", colour.name, depth.name, intrinsics)
+    if request.depth_scale is None:
+        log.info("Depth that is integers is millimetres: %s", unit)
+    return read_images(colour, depth, intrinsics, depth_scale=request.depth_scale)
+
+
+def by_name(colours: dict[str, Path], depths: dict[str, Path]) -> dict[str, tuple[Path, Path]]:
+    """Pairs of images that have one stem."""
+    return {stem: (path, depths[stem]) for stem, path in colours.items() if stem in depths}

@@ -1,0 +1,78 @@
+"""A folder of frames that no known recorder wrote: color.png and depth.png, NAME-color.png and
+NAME-depth.png (also with _ or . and with rgb), or the same names below rgb/ or color/ and depth/.
+
+Intrinsics are the one JSON file whose name speaks of a camera, here or in the folder above.
+"""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+from brrp_cli.errors import FrameError
+from brrp_cli.frames.dump import COLOUR_ENDINGS, DEPTH_ENDINGS, by_name, images_in, read_pair
+from brrp_cli.frames.format import Format, Request
+from brrp_cli.frames.formats import azure_kinect, bop, brrp_real, published_view, realsense, tum
+from brrp_cli.frames.frame import Frame
+
+_COLOUR = re.compile(r"^(.*?)[-_.]?(?:color|colour|rgb)$", re.IGNORECASE)
+_DEPTH = re.compile(r"^(.*?)[-_.]?depth$", re.IGNORECASE)
+_CAMERA = re.compile(r"camera|intrinsic|calib|^k$", re.IGNORECASE)
+_COLOUR_FOLDERS = ("color", "colour", "rgb", "image", "images")
+# What has a reader of its own is not read as just any folder.
+_OWN = (azure_kinect, bop, brrp_real, published_view, realsense, tum)
+
+
+def pairs_in(folder: Path) -> dict[str, tuple[Path, Path]]:
+    """Name -> (colour, depth) of the frames in a folder, by name; `0` where they have none."""
+    for name in _COLOUR_FOLDERS:
+        pairs = by_name(
+            images_in(folder / name, COLOUR_ENDINGS), images_in(folder / "depth", DEPTH_ENDINGS)
+        )
+        if pairs:
+            return pairs
+    colours = _named(images_in(folder, COLOUR_ENDINGS), _COLOUR)
+    return by_name(colours, _named(images_in(folder, DEPTH_ENDINGS), _DEPTH))
+
+
+def _named(files: dict[str, Path], pattern: re.Pattern[str]) -> dict[str, Path]:
+    found = {stem: pattern.match(stem) for stem in files}
+    return {match[1] or "0": files[stem] for stem, match in found.items() if match}
+
+
+def find_intrinsics(folder: Path) -> Path:
+    """The JSON file of the camera, in the folder or in the one above. Errors: FrameError."""
+    for place in (folder, folder.resolve().parent):
+        found = sorted(path for path in place.glob("*.json") if _CAMERA.search(path.stem))
+        if len(found) == 1:
+            return found[0]
+        if found:
+            raise FrameError(
+                "Several files could hold the intrinsics",
+                where=place,
+                found=", ".join(path.name for path in found),
+                fix="name the right one: --intrinsics K.json",
+            )
+    raise FrameError(
+        "No intrinsics were found",
+        where=folder,
+        expected="a JSON file whose name speaks of a camera or intrinsics, here or one folder up",
+        fix="pass --intrinsics K.json",
+    )
+
+
+def read(folder: Path, request: Request) -> Frame:
+    """The frame that --index names or counts, the first else. Errors: FrameError."""
+    intrinsics = request.intrinsics or find_intrinsics(folder)
+    unit = "assumed; --depth-scale says otherwise"
+    return read_pair(pairs_in(folder), intrinsics, request, folder, unit)
+
+
+FORMAT = Format(
+    title="a folder of frames",
+    layout="color.png, depth.png; NAME-color.png, NAME-depth.png; or color/NAME, depth/NAME",
+    matches=lambda path: (
+        path.is_dir() and not any(own.FORMAT.matches(path) for own in _OWN) and bool(pairs_in(path))
+    ),
+    read=read,
+)

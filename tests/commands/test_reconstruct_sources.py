@@ -1,0 +1,95 @@
+"""From a camera's images to meshes in one command, masks made on the way."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+from PIL import Image
+from table_scene import T_CAM_WORLD, K, in_camera, photograph
+
+from brrp_cli.cli import main
+from brrp_cli.frames.npz import load_frame
+from brrp_cli.shapes import solids
+
+
+@pytest.fixture(scope="module")
+def images(tmp_path_factory):
+    """color.png, depth.png and camera.json of two boxes."""
+    folder = tmp_path_factory.mktemp("dump") / "000000"
+    folder.mkdir()
+    things = {
+        i: in_camera(solids.moved(solids.box(0.07, 0.07, 0.1), y=y), T_CAM_WORLD)
+        for i, y in ((1, -0.09), (2, 0.09))
+    }
+    frame = photograph(things)
+    Image.fromarray(frame.rgb).save(folder / "color.png")
+    depth = np.nan_to_num(frame.points[..., 2])
+    Image.fromarray((depth * 1000).round().astype(np.uint16)).save(folder / "depth.png")
+    Image.fromarray(frame.segmap.astype(np.uint8)).save(folder / "m.png")
+    (folder / "camera.json").write_text(json.dumps({"K": K.tolist()}))
+    return folder
+
+
+def run(*arguments):
+    return CliRunner().invoke(main, ["reconstruct", *map(str, arguments), "--method", "vprism"])
+
+
+def files(folder):
+    return [
+        "--color", folder / "color.png", "--depth", folder / "depth.png",
+        "--intrinsics", folder / "camera.json",
+    ]  # fmt: skip
+
+
+def test_images_become_meshes_in_one_command(images, tmp_path, caplog):
+    out = tmp_path / "out"
+    with caplog.at_level("INFO"):
+        result = run(*files(images), "-o", out)
+    assert result.exit_code == 0, result.output
+    assert len(list(out.glob("object_*.ply"))) == 2
+    assert load_frame(out / "frame.npz").object_ids == [1, 2]
+    assert (tmp_path / "out.masks.png").is_file()
+    assert "taken as millimetres" in caplog.text
+    assert "out.masks.png" in result.output
+    assert "brrp segment" in result.output
+    # What was written is corrected, and reconstructed again, by the same commands.
+    fixed = tmp_path / "fixed.npz"
+    arguments = ["segment", out / "frame.npz", "--drop", "1", "-o", fixed]
+    assert CliRunner().invoke(main, list(map(str, arguments))).exit_code == 0
+    again = run(fixed)
+    assert again.exit_code == 0, again.output
+    assert [path.name for path in (tmp_path / "fixed_vprism").glob("*.ply")] == ["object_2.ply"]
+
+
+def test_a_folder_becomes_meshes_beside_it(images):
+    result = run(images)
+    assert result.exit_code == 0, result.output
+    assert (images.parent / "000000_vprism" / "result.json").is_file()
+    refused = run(images)
+    assert refused.exit_code == 1
+    assert "--overwrite" in refused.output
+
+
+def test_masks_that_are_given_are_used(images, tmp_path):
+    out = tmp_path / "out"
+    result = run(*files(images), "--masks", images / "m.png", "-o", out)
+    assert result.exit_code == 0, result.output
+    assert not (tmp_path / "out.masks.png").exists()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ([], "missing --color, --depth, --intrinsics"),
+        (["--color", "c.png"], "missing --depth, --intrinsics"),
+        (["scene", "--color", "c.png"], "either SOURCE or"),
+        (["scene", "--masks-dir", "d"], "goes with --prompt"),
+    ],
+)
+def test_wrong_usage_is_exit_code_2(arguments, message):
+    result = run(*arguments)
+    assert result.exit_code == 2
+    assert message in result.output

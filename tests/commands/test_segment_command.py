@@ -1,0 +1,115 @@
+"""`brrp segment` as people type it: masks made, shown, corrected."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+from PIL import Image
+from table_scene import T_CAM_WORLD, in_camera, photograph
+
+from brrp_cli.cli import main
+from brrp_cli.frames import edit_masks
+from brrp_cli.frames.build import make_frame
+from brrp_cli.frames.npz import load_frame, save_frame
+from brrp_cli.shapes import solids
+
+
+def boxes_in_a_row():
+    """Boxes 4, 7 and 9 on a table, the first two side by side."""
+    places = {4: -0.045, 7: 0.045, 9: 0.2}
+    things = {
+        i: in_camera(solids.moved(solids.box(0.08, 0.08, 0.06 + 0.01 * i), y=y), T_CAM_WORLD)
+        for i, y in places.items()
+    }
+    return photograph(things)
+
+
+@pytest.fixture
+def saved(tmp_path):
+    frame = boxes_in_a_row()
+    save_frame(frame, tmp_path / "f.npz")
+    return tmp_path / "f.npz", frame
+
+
+def run(*arguments):
+    return CliRunner().invoke(main, ["segment", *map(str, arguments)])
+
+
+def test_masks_are_corrected_by_id(saved, tmp_path):
+    path, frame = saved
+    result = run(path, "--merge", "4,7", "--drop", "9", "-o", tmp_path / "g.npz")
+    assert result.exit_code == 0, result.output
+    fixed = load_frame(tmp_path / "g.npz")
+    assert np.array_equal(fixed.segmap, np.where(np.isin(frame.segmap, (4, 7)), 4, 0))
+    with Image.open(tmp_path / "g.ids.png") as ids:
+        assert np.array_equal(np.asarray(ids), fixed.segmap)
+    assert (tmp_path / "g.masks.png").is_file()
+
+
+def test_one_mask_over_two_things_is_split_where_they_meet(saved, tmp_path):
+    path, frame = saved
+    run(path, "--merge", "4,7", "-o", tmp_path / "g.npz")
+    result = run(tmp_path / "g.npz", "--split", "4", "-o", tmp_path / "h.npz")
+    assert result.exit_code == 0, result.output
+    found = load_frame(tmp_path / "h.npz")
+    assert found.object_ids == [4, 9, 10]
+    for truth in (4, 7):
+        shares = [
+            ((found.segmap == i) & (frame.segmap == truth)).sum() / (frame.segmap == truth).sum()
+            for i in (4, 10)
+        ]
+        assert max(shares) > 0.9, truth
+    assert " new" in result.output
+
+
+def test_what_has_no_inner_boundary_is_split_by_nearness():
+    frame = boxes_in_a_row()
+    pieces = edit_masks.split(frame, 9, 3)
+    assert np.array_equal(pieces != 0, frame.segmap != 0)
+    sizes = [int((pieces == i).sum()) for i in (9, 10, 11)]
+    assert min(sizes) > 0.1 * sum(sizes)
+
+
+def test_masks_are_kept_unless_asked_for_again(saved, tmp_path):
+    path, frame = saved
+    assert run(path, "-o", tmp_path / "g.npz").exit_code == 0
+    assert np.array_equal(load_frame(tmp_path / "g.npz").segmap, frame.segmap)
+    assert run(path, "--again", "-o", tmp_path / "h.npz").exit_code == 0
+    assert load_frame(tmp_path / "h.npz").object_ids[0] == 1
+
+
+def test_a_frame_without_masks_gets_some(saved, tmp_path):
+    _, frame = saved
+    bare = make_frame(frame.rgb, None, depth=np.nan_to_num(frame.points[..., 2]), K=frame.K)
+    save_frame(bare, tmp_path / "b.npz")
+    result = run(tmp_path / "b.npz", "-o", tmp_path / "g.npz")
+    assert result.exit_code == 0, result.output
+    assert len(load_frame(tmp_path / "g.npz").object_ids) >= 2
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "message"),
+    [
+        (["--merge", "4,5"], 1, "no such object"),
+        (["--drop", "5"], 1, "no such object"),
+        (["--merge", "4"], 2, "two ids"),
+        (["--merge", "a,b"], 2, "whole numbers"),
+        (["--split", "4:1"], 2, "two pieces"),
+        (["--split", "x"], 2, "ID:PIECES"),
+        (["--drop", "4,7,9"], 1, "no object in the mask"),
+    ],
+)
+def test_wrong_corrections_are_told_and_write_nothing(saved, tmp_path, arguments, code, message):
+    result = run(saved[0], *arguments, "-o", tmp_path / "g.npz")
+    assert result.exit_code == code, result.output
+    assert message in result.output
+    assert not list(tmp_path.glob("g*"))
+
+
+def test_nothing_is_overwritten_unasked(saved, tmp_path):
+    path, _ = saved
+    (tmp_path / "g.ids.png").write_text("mine")
+    assert run(path, "-o", tmp_path / "g.npz").exit_code == 1
+    assert run(path, "--drop", "9", "-o", path, "--overwrite").exit_code == 0
+    assert load_frame(path).object_ids == [4, 7]
