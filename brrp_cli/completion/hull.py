@@ -23,3 +23,9 @@ def hull_facets(points: Array) -> Array:
         hull = ConvexHull(copies + rng.normal(0, THICKNESS, copies.shape))
     # Qhull splits a flat facet into triangles of one equation.
     return np.unique(hull.equations.round(6), axis=0)
+
+
+def outside_hull(points: Array, facets: Array) -> Array:
+    """How far (n,) points (n, 3) lie outside of a hull's facets (f, 4), less than 0 inside: a lower
+    bound of the distance to the hull."""
+    return np.asarray((points @ facets[:, :3].T + facets[:, 3]).max(axis=1))
