@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brrp_cli.config import RegistrationConfig
-from brrp_cli.dependencies import import_open3d, one_openmp_thread
+from brrp_cli.dependencies import import_open3d, seeded_open3d
 from brrp_cli.prior.objects import FeatureCloud
 
 
@@ -25,12 +25,9 @@ def match_features(
     source: FeatureCloud, target: FeatureCloud, config: RegistrationConfig, seed: int
 ) -> Match | None:
     """The rigid motion with most inlier pairs; None when no draw of matches holds together."""
-    o3d = import_open3d()
-    pipeline = o3d.pipelines.registration
+    pipeline = import_open3d().pipelines.registration
     distance = config.correspondence_distance
-    with one_openmp_thread():
-        # Seeded right before the call, or an earlier draw in the process would change the result.
-        o3d.utility.random.seed(seed)
+    with seeded_open3d(seed):
         result = pipeline.registration_ransac_based_on_feature_matching(
             _cloud(source),
             _cloud(target),
