@@ -28,6 +28,7 @@ from brrp_cli.methods.registry import METHODS, RECONSTRUCTING
 from brrp_cli.prior.store import Prior
 from brrp_cli.progress import progress
 from brrp_cli.retrieval.checked import CheckedRetriever
+from brrp_cli.threads import cores, in_threads
 
 if TYPE_CHECKING:
     from brrp_cli.retrieval.base import Retriever
@@ -89,6 +90,7 @@ def reconstruct(
     weights: str | Path | None = None,
     seed: int = 0,
     device: str = "auto",
+    workers: int | None = None,
 ) -> Reconstruction:
     """Reconstruct every object of a segmented frame.
 
@@ -98,7 +100,8 @@ def reconstruct(
     retriever : P(c|R); without one, CLIP if `BRRP_CLIP_DIR` is set or CLIP was fetched, else
     appearance, else (with a prior of an older brrp) registration fitness. An object that cannot be
     reconstructed gets a status; the others still are. The frame is never changed. The same seed
-    gives the same result.
+    gives the same result, whatever the number of `workers`: objects at a time, by default as many
+    as there are cores.
 
     Errors: BrrpError for an unknown method, or a prior, retriever or weights that it lacks or
     cannot use; PriorError for a shard that is damaged, when an object is read from it.
@@ -134,15 +137,16 @@ def reconstruct(
             frame, scene.plane, observation, prior, retriever, config, seed=seed, device=device
         )
 
-    objects = []
-    for object_id in progress(frame.object_ids, "objects"):
+    def whole(object_id: int) -> ObjectReconstruction:
         if object_id in scene.too_few:
-            objects.append(_too_few(object_id, scene.too_few[object_id], config))
-            continue
-        objects.append(_whole(object_id, partial(one, scene.objects[object_id]), config))
+            return _too_few(object_id, scene.too_few[object_id], config)
+        return _whole(object_id, partial(one, scene.objects[object_id]), config)
+
+    ids = frame.object_ids
+    done = in_threads(whole, ids, workers or cores())
     return Reconstruction(
         frame=frame,
-        objects=objects,
+        objects=list(progress(done, "objects", len(ids))),
         plane=scene.plane,
         method=method,
         retriever=retriever.name,

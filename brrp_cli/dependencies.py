@@ -5,8 +5,10 @@ from __future__ import annotations
 import ctypes
 import importlib
 import sys
-from contextlib import AbstractContextManager
+from collections.abc import Iterator
+from contextlib import AbstractContextManager, contextmanager
 from functools import cache
+from threading import Lock
 from types import ModuleType
 from typing import Any
 
@@ -55,7 +57,8 @@ def import_open3d() -> Any:
 
 
 @cache
-def _thread_pools() -> Any:
+def thread_pools() -> Any:
+    """The threads of the libraries that are loaded, to be limited."""
     from threadpoolctl import ThreadpoolController
 
     # Made once: it searches the process for libraries. Open3D must be among them by then.
@@ -67,5 +70,18 @@ def one_openmp_thread() -> AbstractContextManager[object]:
     """Hold OpenMP to one thread: the threads of Open3D's RANSAC take turns at one random stream,
     and those of its ICP add in the order in which they end, so that a seed is not enough to repeat
     a result on several."""
-    pools: AbstractContextManager[object] = _thread_pools().limit(limits=1, user_api="openmp")
+    pools: AbstractContextManager[object] = thread_pools().limit(limits=1, user_api="openmp")
     return pools
+
+
+# Open3D has one stream of random numbers for the whole process.
+_DRAWING = Lock()
+
+
+@contextmanager
+def seeded_open3d(seed: int) -> Iterator[None]:
+    """Draws of Open3D that hang on `seed` alone: no other thread draws meanwhile. Seeded right
+    before, or an earlier draw in the process would change the result."""
+    with _DRAWING, one_openmp_thread():
+        import_open3d().utility.random.seed(seed)
+        yield

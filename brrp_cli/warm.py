@@ -30,7 +30,7 @@ class Reconstructor:
     """Reconstructs frame after frame with one prior, one retriever and one maker of masks.
 
     prior : opened, or the path of one; None with a method that has none ("vprism")
-    config, weights, seed, device : as in `reconstruct`
+    config, weights, seed, device, workers : as in `reconstruct`
     retriever : a name as `brrp reconstruct --retriever` takes it
     prompt : makes masks of what it names where a frame has none; None = of what stands on the
         table, without a model
@@ -51,7 +51,9 @@ class Reconstructor:
         masks_dir: Path | None = None,
         seed: int = 0,
         device: str = "auto",
+        workers: int | None = None,
     ) -> None:
+        self._workers = workers
         self._method, self._seed, self._device, self._prompt = method, seed, device, prompt
         self._weights = weights
         self._config = config or preset("default")
@@ -86,6 +88,7 @@ class Reconstructor:
             weights=self._weights,
             seed=self._seed,
             device=self._device,
+            workers=self._workers,
         )
         result.seconds["masks"] = seconds
         return result

@@ -69,6 +69,7 @@ OF_A_PRIOR = ("prior_path", "preset_name", "k", "retriever", "clip_dir")
 @click.option("--frame", "coordinates", type=click.Choice(["camera", "world"]), default="camera")
 @click.option("--seed", type=int, default=0, show_default=True)
 @click.option("--device", type=click.Choice(["auto", "cpu", "cuda"]), default="auto")
+@click.option("--workers", type=click.IntRange(1), help="Objects at a time. [default: cores]")
 @click.option(
     "--collision",
     type=click.Choice([*HOW, NO_COLLISION]),
@@ -95,6 +96,7 @@ def command(
     coordinates: str,
     seed: int,
     device: str,
+    workers: int | None,
     collision: str,
     confidence: float | None,
     overwrite: bool,
@@ -151,6 +153,7 @@ def command(
         weights=weights,
         seed=seed,
         device=device,
+        workers=workers,
     )
     write_results(result, output, frame=coordinates, overwrite=overwrite)
     report(result)

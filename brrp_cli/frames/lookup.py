@@ -6,7 +6,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brrp_cli.frames.frame import Frame
-from brrp_cli.geometry import project
 
 
 def depth_behind(points: NDArray[np.floating], frame: Frame) -> NDArray[np.float64]:
@@ -21,11 +20,22 @@ def at_pixels(
 ) -> NDArray[np.float64]:
     """Values (n,) of an image (H, W) at the pixels of points (n, 3), camera frame; NaN outside of
     the image and behind the camera."""
-    found = np.full(len(points), np.nan)
-    ahead = np.flatnonzero(points[:, 2] > 0)
-    pixels = np.rint(project(points[ahead], frame.K)).astype(np.int64)
+    pixel, inside = pixel_numbers(points, frame)
+    return np.where(inside, image.ravel()[pixel], np.nan)
+
+
+def pixel_numbers(
+    points: NDArray[np.floating], frame: Frame
+) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+    """The pixels of points (n, 3), camera frame, numbered row by row (n,), and which points (n,)
+    have one: others lie outside of the image or behind the camera, and get number 0."""
     height, width = frame.shape
-    inside = (pixels >= 0).all(axis=1) & (pixels[:, 0] < width) & (pixels[:, 1] < height)
-    columns, rows = pixels[inside].T
-    found[ahead[inside]] = image[rows, columns]
-    return found
+    z = points[:, 2]
+    with np.errstate(all="ignore"):
+        u, v = (
+            np.rint(points[:, i] / z * frame.K[i, i] + frame.K[i, 2], dtype=np.float64)
+            for i in range(2)
+        )
+        inside = (z > 0) & (u >= 0) & (u < width) & (v >= 0) & (v < height)
+        number = np.where(inside, v * width + u, 0)
+    return number.astype(np.int64), inside

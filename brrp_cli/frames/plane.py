@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brrp_cli.config import ObservationConfig
-from brrp_cli.dependencies import import_open3d
+from brrp_cli.dependencies import import_open3d, seeded_open3d
 from brrp_cli.geometry import normalise, similarity
 from brrp_cli.seeds import child_seed
 
@@ -72,11 +72,11 @@ def largest_plane(
         drawn = points[np.random.default_rng(seed).choice(len(points), _RANSAC_POINTS, False)]
     o3d = import_open3d()
     cloud = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(drawn))
-    o3d.utility.random.seed(seed)
     # With probability 1 every iteration is run: stopping early depends on which thread is first.
-    model, _ = cloud.segment_plane(
-        tolerance, ransac_n=3, num_iterations=iterations, probability=1.0
-    )
+    with seeded_open3d(seed):
+        model, _ = cloud.segment_plane(
+            tolerance, ransac_n=3, num_iterations=iterations, probability=1.0
+        )
     model = np.asarray(model) / np.linalg.norm(model[:3])
     for _ in range(2):
         inliers = points[np.abs(points @ model[:3] + model[3]) < tolerance]

@@ -15,7 +15,9 @@ from dataclasses import dataclass
 
 import torch
 from torch import Tensor
-from torch.nn.functional import softplus
+from torch.nn.functional import pad, softplus
+
+from brrp_cli.inference.hinge import Factors
 
 
 @dataclass(frozen=True)
@@ -48,13 +50,15 @@ def mean_bce(weights: Tensor, samples: Samples) -> tuple[Tensor, Tensor]:
     return loss, residual @ samples.phi
 
 
-def logistic_score(weights: Tensor, phi: Tensor, labels: Tensor, mean: Tensor) -> Tensor:
-    """Gradient (P, D) of the mean binary cross-entropy of logits mean + w . phi.
+def logistic_score(weights: Tensor, phi: Factors, labels: Tensor, mean: Tensor) -> Tensor:
+    """Gradient (P, D) of the mean binary cross-entropy of logits mean + w . phi, without a bias.
 
-    weights : (P, D); phi : (n, D); labels : (n,); mean : (P, n), a logit of each particle's own.
+    weights : (P, D), the first of each, the bias, not used; phi : of n points; labels : (n,);
+    mean : (P, n), a logit of each particle's own. The first column of the gradient is 0.
     """
-    logits = mean + weights @ phi.mT
-    return (torch.sigmoid(logits) - labels) @ phi / logits.shape[-1]
+    logits = mean + phi.dot(weights[:, 1:])
+    gradient = phi.transpose_dot((torch.sigmoid(logits) - labels) / logits.shape[-1])
+    return pad(gradient, (1, 0))
 
 
 def log_density(

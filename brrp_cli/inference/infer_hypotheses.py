@@ -18,7 +18,7 @@ from torch import Tensor
 
 from brrp_cli.config import FittedMapConfig
 from brrp_cli.inference.density import logistic_score
-from brrp_cli.inference.hinge import HingeGrid, features
+from brrp_cli.inference.hinge import HingeGrid, factors
 from brrp_cli.inference.hypothesis_posterior import HypothesisPosterior
 from brrp_cli.inference.infer import LabelledPoints
 from brrp_cli.inference.mean import MeanLattice
@@ -52,9 +52,7 @@ def infer_correction(
     which = share_out(problem.weights, config.particles)
     samples = _inside(_behind(problem.observed, config.behind), problem.box, grid.spacing)
     points = torch.from_numpy((samples.points - center).astype(np.float32)).to(device)
-    phi = features(points, grid)
-    # Far from all hinge points the map is the mean and nothing else.
-    phi[:, 0] = 0
+    phi = factors(points, grid)
     labels = torch.from_numpy(samples.labels.astype(np.float32)).to(device)
     mean = torch.from_numpy(problem.mean.logits(samples.points)[which]).to(device)
     generator = torch.Generator().manual_seed(child_seed(seed, "correction"))
@@ -64,8 +62,9 @@ def infer_correction(
         if not len(labels):
             return norm
         rows = torch.randint(len(labels), (config.batch,), generator=generator).to(device)
-        fit = logistic_score(weights, phi[rows], labels[rows], mean[:, rows])
-        return norm - config.lambda_observed * fit
+        return norm - config.lambda_observed * logistic_score(
+            weights, phi.rows(rows), labels[rows], mean[:, rows]
+        )
 
     start = config.start * torch.randn(config.particles, grid.dimension, generator=generator)
     start[:, 0] = 0

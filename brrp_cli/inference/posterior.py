@@ -8,11 +8,11 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from brrp_cli.inference.hinge import HingeGrid, features, lattice_logits
+from brrp_cli.inference.hinge import HingeGrid, factors, lattice_logits
 from brrp_cli.methods.base import LOGIT_VARIANCE, Axes
 
-# Features of this many points are formed at once: 20,000 x 1,729 floats are 140 MB.
-CHUNK = 20_000
+# So many points at once: their products stay in the cache.
+CHUNK = 2_048
 
 
 @dataclass(frozen=True)
@@ -38,8 +38,8 @@ class HilbertPosterior:
         # Centre in float64: kernels of centimetres leave no room for float32 far from the origin.
         local = torch.from_numpy((np.asarray(points, np.float64) - self.center).astype(np.float32))
         weights = torch.from_numpy(self.weights)
-        parts = [weights @ features(part, self.grid).T for part in local.split(CHUNK)]
-        return np.asarray(torch.cat(parts, dim=1).numpy())
+        parts = [factors(part, self.grid).dot(weights[:, 1:]) for part in local.split(CHUNK)]
+        return np.asarray((torch.cat(parts, dim=1) + weights[:, :1]).numpy())
 
     def probability(self, points: NDArray[np.floating]) -> NDArray[np.float32]:
         """Occupancy probability (n,): mean over particles of sigmoid(w . phi)."""

@@ -61,6 +61,8 @@ def _brrp(frame: Frame, setup: Setup) -> list[ObjectReconstruction]:
         retriever=setup.retriever,
         seed=setup.seed,
         device=setup.device,
+        # Scenes are shared out among processes.
+        workers=1,
     )
     for item in result.objects:
         share = result.seconds["observation"] / len(result.objects)

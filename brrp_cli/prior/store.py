@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import hashlib
-from collections import defaultdict
+from collections import OrderedDict, defaultdict
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
+from threading import Lock
 from typing import Any
 
 from brrp_cli.errors import BrrpError, PriorError
@@ -26,15 +27,21 @@ from brrp_cli.prior.pack import unpack
 from brrp_cli.prior.shard import damaged, object_names, open_shard, read_stored
 from brrp_cli.prior.sidecar import is_whole
 
+# Objects that are held in memory once they were read, about 2 MB each.
+HELD = 64
+
 
 @dataclass
 class Prior:
     """A prior, opened to read. Shards are read when an object is asked for, and checked against
-    the manifest's sha256 before the first byte of theirs is used."""
+    the manifest's sha256 before the first byte of theirs is used. The `HELD` objects that were
+    asked for last are held."""
 
     path: Path
     index: Index
     _checked: set[str] = field(default_factory=set, repr=False)
+    _held: OrderedDict[str, PriorObject] = field(default_factory=OrderedDict, repr=False)
+    _reading: Lock = field(default_factory=Lock, repr=False, compare=False)
 
     @cached_property
     def manifest(self) -> Manifest:
@@ -84,7 +91,17 @@ class Prior:
         return self.index.digest
 
     def load(self, name: str) -> PriorObject:
-        """Read one object. Errors: KeyError for an unknown name, PriorError for a bad shard."""
+        """One object, not to be changed. Errors: KeyError for an unknown name, PriorError for a bad
+        shard."""
+        with self._reading:
+            if name not in self._held:
+                self._held[name] = self._read(name)
+            self._held.move_to_end(name)
+            if len(self._held) > HELD:
+                self._held.popitem(last=False)
+            return self._held[name]
+
+    def _read(self, name: str) -> PriorObject:
         row = self.index.rows[name]
         shard = self.index.shards[self.index.shard_of[row]]
         if shard.file not in self._checked:

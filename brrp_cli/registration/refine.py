@@ -1,4 +1,4 @@
-"""Refine a placement: ICP of the observed points onto the model's surface, point to plane."""
+"""Refine placements: ICP of the observed points onto the model's surface, point to plane."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ def refine(
     normals: NDArray[np.floating],
     distance: float,
 ) -> NDArray[np.float64]:
-    """Rigid T_observed_model (4, 4), moved so that observed points lie on the model.
+    """Rigid T_observed_model (B, 4, 4), each moved so that observed points lie on the model.
 
     observed : (n, 3); model, normals : (m, 3), the model's surface, metres; distance : pairs
     further apart than this, metres, do not pull. The observed points are matched to the model and
@@ -27,13 +27,12 @@ def refine(
     pipeline = o3d.pipelines.registration
     target = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(model.astype(np.float64)))
     target.normals = o3d.utility.Vector3dVector(normals.astype(np.float64))
+    source = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(observed.astype(np.float64)))
+    estimation = pipeline.TransformationEstimationPointToPlane()
+    criteria = pipeline.ICPConvergenceCriteria(max_iteration=ITERATIONS)
     with one_openmp_thread():
-        result = pipeline.registration_icp(
-            o3d.geometry.PointCloud(o3d.utility.Vector3dVector(observed.astype(np.float64))),
-            target,
-            distance,
-            np.linalg.inv(T_observed_model),
-            pipeline.TransformationEstimationPointToPlane(),
-            pipeline.ICPConvergenceCriteria(max_iteration=ITERATIONS),
-        )
-    return np.asarray(np.linalg.inv(result.transformation))
+        found = [
+            pipeline.registration_icp(source, target, distance, T, estimation, criteria)
+            for T in np.linalg.inv(T_observed_model)
+        ]
+    return np.linalg.inv(np.stack([each.transformation for each in found]))

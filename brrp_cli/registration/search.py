@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brrp_cli.config import FeatureConfig, SearchConfig
-from brrp_cli.geometry import similarity, transform_points
+from brrp_cli.geometry import transform_points
 from brrp_cli.registration.model import COARSE, FINE, Model
 from brrp_cli.registration.refine import refine
 from brrp_cli.registration.scan import ObservedCloud
@@ -55,14 +55,16 @@ def search(
     if testimony.plane is not None:
         starts += resting_starts(model, testimony.points, testimony.plane, config.turns)
     T = _best(np.stack(starts), model, testimony, config, config.coarse)
-    T = _refined(T, model, testimony, config.coarse_distance, config.coarse_points)
+    T = _refined(T, 1.0, model, testimony, config.coarse_distance, config.coarse_points)
     T = _best(T, model, testimony, config, config.fine)
-    T = _refined(T, model, testimony, config.fine_distance, config.fine_points)
+    T = _refined(T, 1.0, model, testimony, config.fine_distance, config.fine_points)
     found = _judged(T, 1.0, model, testimony, config)
     parents = [each.T_cam_model for each in found[: config.rescaled]]
     for scale in config.scales:
         resized = np.stack([_resize(parent, scale, testimony) for parent in parents])
-        resized = _refined(resized, model, testimony, config.scale_distance, config.coarse_points)
+        resized = _refined(
+            resized, scale, model, testimony, config.scale_distance, config.coarse_points
+        )
         found += _judged(resized, scale, model, testimony, config)
     return _distinct(sorted(found, key=lambda each: -each.evidence), config)
 
@@ -114,28 +116,27 @@ def _judged(
 
 
 def _refined(
-    T_cam_model: Array, model: Model, testimony: Testimony, distance: float, points: int
+    T_cam_model: Array,
+    scale: float,
+    model: Model,
+    testimony: Testimony,
+    distance: float,
+    points: int,
 ) -> Array:
-    """Each placement after ICP that keeps its scale; pairs further apart than `distance` metres do
-    not pull."""
+    """Each placement (B, 4, 4) after ICP that keeps its scale, which is that of all; pairs further
+    apart than `distance` metres do not pull."""
     seen = testimony.points[:points]
     # ICP turns about the origin: at the object it needs no long way.
     center = seen.mean(axis=0)
-    refined = []
-    for T in T_cam_model:
-        scale = float(np.cbrt(np.linalg.det(T[:3, :3])))
-        T_center_model = T.copy()
-        T_center_model[:3, :3] /= scale
-        T_center_model[:3, 3] -= center
-        found = refine(
-            T_center_model,
-            seen - center,
-            model.surface[:FINE] * scale,
-            model.normals[:FINE],
-            distance,
-        )
-        refined.append(similarity(scale, found[:3, :3], found[:3, 3] + center))
-    return np.stack(refined)
+    T_center_model = T_cam_model.copy()
+    T_center_model[:, :3, :3] /= scale
+    T_center_model[:, :3, 3] -= center
+    refined = refine(
+        T_center_model, seen - center, model.surface[:FINE] * scale, model.normals[:FINE], distance
+    )
+    refined[:, :3, :3] *= scale
+    refined[:, :3, 3] += center
+    return refined
 
 
 def _resize(T_cam_model: Array, scale: float, testimony: Testimony) -> Array:

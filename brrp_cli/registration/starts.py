@@ -9,7 +9,7 @@ from brrp_cli.config import FeatureConfig, RegistrationConfig
 from brrp_cli.frames.plane import Plane, plane_frame
 from brrp_cli.geometry import normalise, similarity, transform_points
 from brrp_cli.registration.model import COARSE, Model
-from brrp_cli.registration.ransac import match_features
+from brrp_cli.registration.ransac import match_repeatedly
 from brrp_cli.registration.scan import ObservedCloud
 from brrp_cli.seeds import child_seed
 
@@ -36,28 +36,44 @@ def resting_starts(model: Model, points: Array, plane: Plane, turns: int) -> lis
     T_cam_plane = np.linalg.inv(T_plane_cam)
     seen = np.asarray(transform_points(T_plane_cam, points))[:, :2]
     middle = np.quantile(seen, [STRAY, 1 - STRAY], axis=0).mean(axis=0)
-    camera = T_plane_cam[:3, 3]
-    surface, normals = model.surface[:COARSE], model.normals[:COARSE]
+    turned = [_turn(angle) for angle in np.arange(turns) * (2 * np.pi / turns)]
     starts = []
     for T_plane_model in model.resting:
-        along = _longest(np.asarray(transform_points(T_plane_model, surface), dtype=np.float64))
-        for angle in np.arange(turns) * (2 * np.pi / turns):
-            T = _turn(angle) @ T_plane_model
-            placed = _lay_over(T, np.asarray(transform_points(T, surface)), middle)
-            facing = np.einsum("ij,ij->i", camera - placed, normals @ T[:3, :3].T) > 0
-            if facing.sum() >= MIN_FACING:
-                placed = _lay_over(T, placed[facing], middle)
-            starts.append(T_cam_plane @ T)
-            direction = _turn(angle)[:2, :2] @ along
-            hidden = np.ptp(placed[:, :2] @ direction) - np.ptp(
-                np.quantile(seen @ direction, [STRAY, 1 - STRAY])
-            )
-            if hidden > HIDDEN:
-                for shift in (hidden / 2, -hidden / 2):
-                    slid = T.copy()
+        T = np.stack(turned) @ T_plane_model
+        placed, counted = _laid_over(T, model, middle, T_plane_cam[:3, 3])
+        directions = np.stack(turned)[:, :2, :2] @ _longest(T_plane_model, model)
+        reach = np.einsum("bmi,bi->bm", placed[..., :2], directions)
+        longest = np.where(counted, reach, -np.inf).max(axis=1)
+        longest -= np.where(counted, reach, np.inf).min(axis=1)
+        hidden = longest - _extents(seen, directions)
+        for each, direction, more in zip(T, directions, hidden, strict=True):
+            starts.append(T_cam_plane @ each)
+            if more > HIDDEN:
+                for shift in (more / 2, -more / 2):
+                    slid = each.copy()
                     slid[:2, 3] += shift * direction
                     starts.append(T_cam_plane @ slid)
     return starts
+
+
+def _laid_over(
+    T_plane_model: Array, model: Model, middle: Array, camera: Array
+) -> tuple[Array, NDArray[np.bool_]]:
+    """Move transforms (B, 4, 4), in place, so that the box of the side that faces the camera (3,)
+    lies over `middle` (2,); returns the placed points (B, m, 3) and which count as that side.
+
+    Which side faces the camera is found with the whole model laid over `middle`.
+    """
+    linear = T_plane_model[:, :3, :3]
+    placed = model.surface[:COARSE] @ linear.mT + T_plane_model[:, None, :3, 3]
+    counted = np.ones(placed.shape[:2], dtype=bool)
+    _lay_over(T_plane_model, placed, counted, middle)
+    normals = model.normals[:COARSE] @ linear.mT
+    facing = np.einsum("bmi,bmi->bm", camera - placed, normals) > 0
+    enough = facing.sum(axis=1) >= MIN_FACING
+    counted[enough] = facing[enough]
+    _lay_over(T_plane_model, placed, counted, middle)
+    return placed, counted
 
 
 def matched_starts(
@@ -79,22 +95,25 @@ def matched_starts(
     T_cam_center = similarity(translation=observed.center)
     behind = normalise(observed.center) * np.ptp(model.surface, axis=0).mean() / 4
     starts = [T_cam_center @ similarity(translation=behind)]
-    for number in range(count):
-        found = match_features(
-            stored.clouds[nearest],
-            observed.cloud,
-            matching,
-            child_seed(seed, "start", stored.name, number),
-        )
-        if found is not None:
-            starts.append(T_cam_center @ found.T_target_source)
+    seeds = [child_seed(seed, "start", stored.name, number) for number in range(count)]
+    matches = match_repeatedly(stored.clouds[nearest], observed.cloud, matching, seeds)
+    starts += [T_cam_center @ found.T_target_source for found in matches if found is not None]
     return starts
 
 
-def _longest(points: Array) -> Array:
-    """Unit direction (2,) along the plane in which points (n, 3), plane frame, reach furthest."""
-    footprint = points[:, :2]
+def _longest(T_plane_model: Array, model: Model) -> Array:
+    """Unit direction (2,) along the plane in which the model reaches furthest."""
+    points = transform_points(T_plane_model, model.surface[:COARSE])
+    footprint = np.asarray(points, dtype=np.float64)[:, :2]
     return np.asarray(np.linalg.svd(footprint - footprint.mean(axis=0), full_matrices=False)[2][0])
+
+
+def _extents(seen: Array, directions: Array) -> Array:
+    """How far points (n, 2) reach in each direction (b, 2), without strays."""
+    # Back is as far as forth.
+    half = len(directions) // 2 if len(directions) % 2 == 0 else len(directions)
+    found = np.ptp(np.quantile(directions[:half] @ seen.T, [STRAY, 1 - STRAY], axis=1), axis=0)
+    return np.tile(found, len(directions) // half)
 
 
 def _turn(angle: float) -> Array:
@@ -102,9 +121,14 @@ def _turn(angle: float) -> Array:
     return similarity(rotation=np.array([[cosine, -sine, 0], [sine, cosine, 0], [0, 0, 1]]))
 
 
-def _lay_over(T_plane_model: Array, placed: Array, middle: Array) -> Array:
-    """Move the transform, in place, so that the box of `placed` (n, 3) lies over `middle` (2,);
-    returns the placed points after it."""
-    shift = middle - (placed.min(axis=0) + placed.max(axis=0))[:2] / 2
-    T_plane_model[:2, 3] += shift
-    return np.asarray(placed + np.append(shift, 0.0))
+def _lay_over(
+    T_plane_model: Array, placed: Array, counted: NDArray[np.bool_], middle: Array
+) -> None:
+    """Move transforms (B, 4, 4) and placed points (B, m, 3), in place, so that the box of the
+    points that count (B, m) lies over `middle` (2,)."""
+    along = placed[..., :2]
+    high = np.where(counted[..., None], along, -np.inf).max(axis=1)
+    low = np.where(counted[..., None], along, np.inf).min(axis=1)
+    shift = middle - (low + high) / 2
+    T_plane_model[:, :2, 3] += shift
+    along += shift[:, None]

@@ -40,11 +40,11 @@ class Testimony:
         surface in space that the camera saw to be free, model surface below the plane. Each is a
         share, so that seen and hidden sides, large and small objects are judged alike.
         """
-        surface = model.surface[:model_points]
+        placed = _placed(T_cam_model, model.surface[:model_points])
         return (
             self._explained(T_cam_model, model, self.points[:seen_points], config)
-            - config.contradiction * self._contradicted(T_cam_model, surface, config)
-            - config.contradiction * self._below(T_cam_model, surface, config)
+            - config.contradiction * self._contradicted(placed, config)
+            - config.contradiction * self._below(placed, config)
         )
 
     def _explained(
@@ -54,25 +54,24 @@ class Testimony:
         others are, so that a search that explains nothing yet still has a slope."""
         linear = T_cam_model[:, :3, :3]
         scale = np.cbrt(np.linalg.det(linear))
-        in_model = np.einsum(
-            "bij,bnj->bni", np.linalg.inv(linear), seen - T_cam_model[:, None, :3, 3]
-        )
+        # A product of matrices is several times faster than einsum, which takes element by element.
+        in_model = (seen - T_cam_model[:, None, :3, 3]) @ np.linalg.inv(linear).mT
         distance = np.abs(model.signed_distance(in_model.reshape(-1, 3)))
         distance = distance.reshape(in_model.shape[:2]) * scale[:, None]
         near = np.exp(-0.5 * (distance / config.near) ** 2).mean(axis=1)
         far = (np.minimum(distance, config.far) / config.far).mean(axis=1)
         return np.asarray(near - config.distance * far)
 
-    def _contradicted(self, T_cam_model: Array, surface: Array, config: EvidenceConfig) -> Array:
-        """Share (B,) of the surface that stands in front of the measured depth, soft in depth."""
-        points = _placed(T_cam_model, surface)
+    def _contradicted(self, points: Array, config: EvidenceConfig) -> Array:
+        """Share (B,) of surfaces (B, m, 3) that stands in front of the measured depth, soft in
+        depth."""
         gap = depth_behind(points.reshape(-1, 3), self.frame).reshape(points.shape[:2])
         return np.asarray(_ramp(np.nan_to_num(gap), config).mean(axis=1))
 
-    def _below(self, T_cam_model: Array, surface: Array, config: EvidenceConfig) -> Array:
+    def _below(self, points: Array, config: EvidenceConfig) -> Array:
         if self.plane is None:
-            return np.zeros(len(T_cam_model))
-        depth = -self.plane.signed_distance(_placed(T_cam_model, surface))
+            return np.zeros(len(points))
+        depth = -self.plane.signed_distance(points)
         return np.asarray(_ramp(depth, config).mean(axis=1))
 
 
@@ -81,5 +80,4 @@ def _ramp(depth: Array, config: EvidenceConfig) -> Array:
 
 
 def _placed(T_cam_model: Array, surface: Array) -> Array:
-    rotated = np.einsum("bij,mj->bmi", T_cam_model[:, :3, :3], surface)
-    return np.asarray(rotated + T_cam_model[:, None, :3, 3])
+    return np.asarray(surface @ T_cam_model[:, :3, :3].mT + T_cam_model[:, None, :3, 3])

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from threading import Lock
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -20,6 +22,8 @@ class CheckedRetriever:
     def __init__(self, retriever: Retriever, count: int) -> None:
         self._retriever = retriever
         self._count = count
+        # Retrievers answer for all objects of a frame at the first question about one.
+        self._asked = Lock()
 
     @property
     def name(self) -> str:
@@ -28,7 +32,8 @@ class CheckedRetriever:
 
     def probabilities(self, frame: Frame, object_id: int) -> NDArray[np.float64]:
         """P(c|R) (n,) for one object."""
-        answer = np.asarray(self._retriever.probabilities(frame, object_id), dtype=np.float64)
+        with self._asked:
+            answer = np.asarray(self._retriever.probabilities(frame, object_id), dtype=np.float64)
         good = answer.shape == (self._count,) and bool((answer >= 0).all())
         if not good or not answer.sum() <= 1 + ROUNDING:
             raise RetrievalError(

@@ -22,7 +22,7 @@ from brrp_cli.geometry import normalise, similarity, transform_points
 from brrp_cli.prior.objects import FeatureCloud, PriorObject
 from brrp_cli.prior.store import Prior
 from brrp_cli.registration.evidence import contradicted, explained
-from brrp_cli.registration.ransac import match_features
+from brrp_cli.registration.ransac import match_repeatedly
 from brrp_cli.registration.refine import refine
 from brrp_cli.registration.scan import ObservedCloud, observed_cloud
 from brrp_cli.retrieval.base import softmax
@@ -84,10 +84,14 @@ class FitnessRetriever:
     def _score(self, candidate: _Candidate, observed: ObservedCloud, frame: Frame) -> float:
         """Explained less contradicted, in [-1, 1], of the best start."""
         best = -1.0
-        for start in self._starts(candidate, observed):
-            T_center_model = refine(
-                start, observed.cloud.points, candidate.surface, candidate.normals, REFINE_DISTANCE
-            )
+        refined = refine(
+            np.stack(self._starts(candidate, observed)),
+            observed.cloud.points,
+            candidate.surface,
+            candidate.normals,
+            REFINE_DISTANCE,
+        )
+        for T_center_model in refined:
             model = transform_points(T_center_model, candidate.surface) + observed.center
             seen = observed.cloud.points + observed.center
             against = contradicted(model[:MODEL_POINTS], frame, TOLERANCE)
@@ -101,12 +105,9 @@ class FitnessRetriever:
         """
         behind = normalise(observed.center) * np.ptp(candidate.surface, axis=0).mean() / 4
         starts = [similarity(translation=behind)]
-        for number in range(STARTS):
-            seed = child_seed(self._seed, "fitness", candidate.name, number)
-            found = match_features(candidate.cloud, observed.cloud, self._matching, seed)
-            if found is not None:
-                starts.append(found.T_target_source)
-        return starts
+        seeds = [child_seed(self._seed, "fitness", candidate.name, n) for n in range(STARTS)]
+        matches = match_repeatedly(candidate.cloud, observed.cloud, self._matching, seeds)
+        return starts + [found.T_target_source for found in matches if found is not None]
 
 
 def _candidate(stored: PriorObject, config: Config) -> _Candidate:
