@@ -18,28 +18,35 @@ import hashlib
 import io
 import json
 import logging
+import multiprocessing
 import shutil
 import sys
 import tempfile
 import time
 import traceback
 from collections.abc import Callable
+from contextlib import nullcontext
 from pathlib import Path
 from types import SimpleNamespace
 
 import atheris
 
-with atheris.instrument_imports(
-    include=[
-        "brrp_cli",
-        "zipfile",
-        "json",
-        "numpy.lib",
-        "numpy.lib._format_impl",
-        "csv",
-        "tomllib",
-        "rosbags",
-    ]
+# The worker that builds the example needs none of it, and imports this file too.
+with (
+    nullcontext()
+    if multiprocessing.parent_process()
+    else atheris.instrument_imports(
+        include=[
+            "brrp_cli",
+            "zipfile",
+            "json",
+            "numpy.lib",
+            "numpy.lib._format_impl",
+            "csv",
+            "tomllib",
+            "rosbags",
+        ]
+    )
 ):
     import numpy as np
 
