@@ -42,7 +42,7 @@ def decode(source: Path | BytesIO, mode: str | None) -> tuple[NDArray[Any], str]
             "The image cannot be read",
             where=where,
             expected="a whole PNG, JPEG or TIFF",
-            found=str(error),
+            found=str(error) if where else "bytes that are no such image",
             fix="it is damaged, cut short or not what its name says: write or fetch it again",
         ) from error
 

@@ -131,7 +131,7 @@ def open_result(folder: str | Path) -> StoredResult:
         )
     try:
         _check(record)
-    except (KeyError, TypeError, ValueError) as error:
+    except (AttributeError, KeyError, TypeError, ValueError) as error:
         raise ResultError(
             "The record of the results is damaged",
             where=path,
@@ -143,7 +143,10 @@ def open_result(folder: str | Path) -> StoredResult:
 
 
 def _check(record: dict[str, Any]) -> None:
-    """KeyError, TypeError or ValueError unless everything that is read of a record is there."""
+    """Whether everything that is read of a record is there.
+
+    Errors: AttributeError, KeyError, TypeError, ValueError.
+    """
     T = _numbers(record["T_frame_cam"], (4, 4))
     if not np.allclose(T[:3, :3] @ T[:3, :3].T, np.eye(3), atol=1e-3):
         raise ValueError("T_frame_cam is no rigid transform")
@@ -151,13 +154,17 @@ def _check(record: dict[str, Any]) -> None:
         raise ValueError(f"frame {record['frame']!r}")
     for key in ("method", "brrp"):
         _text(record[key])
+    for key in ("retriever", "seed"):
+        record[key]
     plane = record["plane_cam"]
     if plane is not None:
         if abs(np.linalg.norm(_numbers(plane["normal"], (3,))) - 1) > 1e-3:
             raise ValueError("the plane's normal is no unit vector")
         _numbers(plane["offset"], ())
-    for value in vars(SurfaceConfig(**record["config"]["surface"])).values():
-        _numbers(value, ())
+    for name, value in record["config"]["surface"].items():
+        if not _numbers(value, ()) > 0:
+            raise ValueError(f"surface {name} {value!r:.60}")
+    SurfaceConfig(**record["config"]["surface"])
     ids = [item["id"] for item in record["objects"]]
     if not all(type(i) is int for i in ids) or len(set(ids)) < len(ids):
         raise ValueError(f"ids {ids[:10]}")
