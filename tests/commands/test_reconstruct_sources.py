@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import base64
 import json
+import re
 
 import numpy as np
 import pytest
@@ -78,6 +80,24 @@ def test_masks_that_are_given_are_used(images, tmp_path):
     result = run(*files(images), "--masks", images / "m.png", "-o", out)
     assert result.exit_code == 0, result.output
     assert not (tmp_path / "out.masks.png").exists()
+
+
+def test_images_become_a_page_in_one_command(images, tmp_path, monkeypatch):
+    opened = []
+    monkeypatch.setattr("webbrowser.open", lambda address: opened.append(address) or True)
+    out = tmp_path / "out"
+    result = run(*files(images), "-o", out, "--collision", "hull", "--html")
+    assert result.exit_code == 0, result.output
+    page = out / "view.html"
+    assert page.read_text().count('id="glb"') == 1
+    assert str(page) in result.output and opened == []
+    # The page shows the collision shapes too, which were made before it.
+    embedded = re.search(r'<script[^>]* id="glb">(.*?)</script>', page.read_text(), re.S)
+    assert b"plan_object_2_part_0" in base64.b64decode(embedded[1])
+
+    result = run(*files(images), "-o", out, "--view", "--overwrite")
+    assert result.exit_code == 0, result.output
+    assert opened == [page.resolve().as_uri()] and page.is_file()
 
 
 @pytest.mark.parametrize(
