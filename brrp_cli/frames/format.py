@@ -51,12 +51,14 @@ class Format:
     title : as messages name it; layout : the files that tell it
     matches : whether a path looks like it, by names alone
     read : the frame, without masks where the format has none. Errors: FrameError
+    last : counts only where no other format matches
     """
 
     title: str
     layout: str
     matches: Callable[[Path], bool]
     read: Callable[[Path, Request], Frame]
+    last: bool = False
 
 
 def pick(items: list[T], index: str | None, names: list[str], path: Path) -> T:
