@@ -53,12 +53,14 @@ class Format:
     title : as messages name it; layout : the files that tell it
     matches : whether a path looks like it, by names alone
     read : the frame, without masks where the format has none. Errors: FrameError
+    last : counts only where no other format matches
     """
 
     title: str
     layout: str
     matches: Callable[[Path], bool]
     read: Callable[[Path, Request], Frame]
+    last: bool = False
 
 
 def counted(index: str) -> int | None:
