@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from table_scene import TABLE, box, in_camera, photograph, placed
@@ -77,6 +79,23 @@ def test_a_cup_that_is_looked_into_stays_hollow():
     middle, wall = transform_points(T, np.array([[0, 0, 0.04], [0, -0.038, 0.03]]))
     probability = completed_logits(np.stack([middle, wall]), part_of(frame), MeanConfig())
     assert empty_space(middle[None], frame, 5, TABLE, MeanConfig())[0] or probability[0] < 0
+
+
+def test_what_is_seen_has_some_thickness_whatever_the_network_says():
+    T = placed(0.0, 0.0, 0.0)
+    frame = photographed(solids.beaker(0.04, 0.04, 0.06, 0.004), T)
+    seen = frame.object_points(5).astype(np.float64)
+    behind = seen * (1 + 0.003 / np.linalg.norm(seen, axis=1, keepdims=True))
+    bare = completed_logits(behind, part_of(frame), replace(MeanConfig(), crust=0.0))
+    assert (bare < 0).any()
+    assert (
+        completed_logits(behind, part_of(frame), MeanConfig()) >= MeanConfig().crust_logit
+    ).all()
+    before = seen * (1 - 0.003 / np.linalg.norm(seen, axis=1, keepdims=True))
+    np.testing.assert_array_equal(
+        completed_logits(before, part_of(frame), config),
+        completed_logits(before, part_of(frame), without),
+    )
 
 
 def test_a_part_has_the_extents_of_what_is_seen():
