@@ -82,19 +82,16 @@ def test_a_cup_that_is_looked_into_stays_hollow():
 
 
 def test_what_is_seen_has_some_thickness_whatever_the_network_says():
-    T = placed(0.0, 0.0, 0.0)
-    frame = photographed(solids.beaker(0.04, 0.04, 0.06, 0.004), T)
+    frame = photographed(solids.beaker(0.04, 0.04, 0.06, 0.004), placed(0.0, 0.0, 0.0))
+    part = part_of(frame)
     seen = frame.object_points(5).astype(np.float64)
-    behind = seen * (1 + 0.003 / np.linalg.norm(seen, axis=1, keepdims=True))
-    bare = completed_logits(behind, part_of(frame), replace(MeanConfig(), crust=0.0))
-    assert (bare < 0).any()
-    assert (
-        completed_logits(behind, part_of(frame), MeanConfig()) >= MeanConfig().crust_logit
-    ).all()
-    before = seen * (1 - 0.003 / np.linalg.norm(seen, axis=1, keepdims=True))
+    ray = seen / np.linalg.norm(seen, axis=1, keepdims=True)
+    config, without = MeanConfig(), replace(MeanConfig(), crust=0.0)
+    behind, before = seen + 0.003 * ray, seen - 0.003 * ray
+    assert (completed_logits(behind, part, without) < 0).any()
+    assert (completed_logits(behind, part, config) >= config.crust_logit).all()
     np.testing.assert_array_equal(
-        completed_logits(before, part_of(frame), config),
-        completed_logits(before, part_of(frame), without),
+        completed_logits(before, part, config), completed_logits(before, part, without)
     )
 
 
