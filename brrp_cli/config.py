@@ -148,7 +148,7 @@ class WeighConfig:
     """
 
     sharpness: float = 40.0
-    unknown_evidence: float = 0.8
+    unknown_evidence: float = 0.7
     least_unknown: float = 0.1
     most_unknown: float = 0.9
     least_share: float = 1e-3

@@ -29,6 +29,14 @@ def sha256_file(path: Path) -> str:
         return hashlib.file_digest(stream, "sha256").hexdigest()
 
 
+def is_file(path: Path) -> bool:
+    """Whether a path, of which a file or a user told the name, is a file; no name is an error."""
+    try:
+        return path.is_file()
+    except (OSError, ValueError):  # a name that no file system takes
+        return False
+
+
 def parse_json(text: str | bytes) -> Any:
     """JSON from a file that may be anything. Errors: ValueError."""
     try:

@@ -1,8 +1,9 @@
-"""Throw bytes at the readers of frames, manifests and tables, guided by which code they reach.
+"""Throw bytes at the readers of frames, manifests, tables and results, guided by which code they
+reach.
 
 A reader may give a result or one of the project's own errors; whatever else comes out of it, or
 takes longer than two seconds, is kept in the folder of findings: the input, and the traceback.
-The first byte of an input chooses the reader. Needs `pip install '.[fuzz]'`.
+The first byte of an input chooses the reader. Needs `pip install '.[fuzz,ros]'`.
 
     nice python tools/fuzz.py --minutes 30 -o findings/
 
@@ -12,40 +13,74 @@ Ends with 1 if there are findings. `--replay FILE...` runs kept inputs again.
 from __future__ import annotations
 
 import argparse
+import atexit
 import hashlib
 import io
 import json
 import logging
+import multiprocessing
+import shutil
 import sys
 import tempfile
 import time
 import traceback
 from collections.abc import Callable
+from contextlib import nullcontext
 from pathlib import Path
+from types import SimpleNamespace
 
 import atheris
 
-with atheris.instrument_imports(
-    include=["brrp_cli", "zipfile", "json", "numpy.lib", "numpy.lib._format_impl", "csv", "tomllib"]
+# The worker that builds the example needs none of it, and imports this file too.
+with (
+    nullcontext()
+    if multiprocessing.parent_process()
+    else atheris.instrument_imports(
+        include=[
+            "brrp_cli",
+            "zipfile",
+            "json",
+            "numpy.lib",
+            "numpy.lib._format_impl",
+            "csv",
+            "tomllib",
+            "rosbags",
+        ]
+    )
 ):
     import numpy as np
 
     from brrp_cli.errors import BrrpError
+    from brrp_cli.evaluation.scenes import find_scenes
     from brrp_cli.evaluation.truth import read_objects
     from brrp_cli.frames.build import make_frame
     from brrp_cli.frames.intrinsics import read_intrinsics
     from brrp_cli.frames.npz import load_frame
     from brrp_cli.frames.pixels import read_colour, read_depth, read_masks
+    from brrp_cli.frames.readers import read_frame
+    from brrp_cli.frames.ros_images import frame_of
     from brrp_cli.prior.descriptions import read_descriptions
     from brrp_cli.prior.index import INDEX_FILE, index_of, read_index
     from brrp_cli.prior.manifest import FILE, parse_manifest
     from brrp_cli.prior.shard import object_names, open_shard, read_stored
     from brrp_cli.retrieval.table import TableRetriever
+    from brrp_cli.surface.stored import open_result
 
 SLOW = 2.0
 MAX_BYTES = 20_000
 DTYPES = ("<f4", "<f8", "<u2", "|u1", "<i8", "<f2", "|b1", "<c8", "<U3", "<M8[s]", ">f4", ">u2")
 WORK = Path(tempfile.mkdtemp(prefix="brrp_fuzz_"))
+atexit.register(shutil.rmtree, WORK, ignore_errors=True)
+# Folders of frames: what is read, and the files that inputs stand in for, one at a time.
+FOLDERS = {
+    "bop": ("scene_camera.json", "scene_gt.json"),
+    "freiburg1": ("rgb.txt", "depth.txt", "groundtruth.txt"),
+    "view/0000": ("../objects.json", "depth.npy", "camera.npz", "seg_mask.npy"),
+    "real": ("xyz.npy", "segmentation.npy"),
+    "recording": ("camera_intrinsic.json", "depth/000000.png"),
+}
+REPLACED = [(folder, name) for folder, names in FOLDERS.items() for name in names]
+ENCODINGS = ("rgb8", "bgra8", "mono8", "16UC1", "32FC1", "mono16", "8UC3", "bayer")
 
 
 def written(data: bytes, name: str) -> Path:
@@ -160,6 +195,66 @@ def images(data: bytes) -> None:
             continue
 
 
+def folders(data: bytes) -> None:
+    """A folder of frames of which one file is any bytes, as a frame and as scenes with truth."""
+    folder, name = REPLACED[data[0] % len(REPLACED)] if data else REPLACED[0]
+    path = WORK / folder / name
+    whole = path.read_bytes()
+    path.write_bytes(data[1:])
+    try:
+        for read in (
+            lambda: finite(read_frame(WORK / folder)),
+            lambda: [finite(s.view(0)) for s in find_scenes(WORK / folder.removesuffix("/0000"))],
+        ):
+            try:
+                read()
+            except BrrpError:
+                continue
+    finally:
+        path.write_bytes(whole)
+
+
+def messages(data: bytes) -> None:
+    """Image messages of ROS with drawn sizes, encodings and bytes."""
+    draw = atheris.FuzzedDataProvider(data)
+
+    def image() -> SimpleNamespace:
+        if draw.ConsumeBool():
+            kind = ("jpeg", "16UC1; compressedDepth png", "32FC1")[draw.ConsumeIntInRange(0, 2)]
+            raw = draw.ConsumeBytes(draw.ConsumeIntInRange(0, 400))
+            return SimpleNamespace(format=kind, data=raw)
+        return SimpleNamespace(
+            encoding=ENCODINGS[draw.ConsumeIntInRange(0, len(ENCODINGS) - 1)],
+            height=draw.ConsumeIntInRange(0, 6),
+            width=draw.ConsumeIntInRange(0, 6),
+            step=draw.ConsumeIntInRange(0, 40),
+            is_bigendian=draw.ConsumeBool(),
+            data=draw.ConsumeBytes(draw.ConsumeIntInRange(0, 240)),
+        )
+
+    numbers = [draw.ConsumeFloat() if draw.ConsumeBool() else float(i == 0) for i in range(9)]
+    info = SimpleNamespace(
+        k=numbers, height=draw.ConsumeIntInRange(0, 6), width=draw.ConsumeIntInRange(0, 6)
+    )
+    finite(frame_of(image(), image(), info))
+
+
+def bag(data: bytes) -> None:
+    """A ROS 1 bag."""
+    finite(read_frame(written(data, "a.bag")))
+
+
+def results(data: bytes) -> None:
+    """A record of results."""
+    (WORK / "out").mkdir(exist_ok=True)
+    written(b"", "out/frame.npz")
+    written(data, "out/result.json")
+    stored = open_result(WORK / "out")
+    assert np.isfinite(stored.T_frame_cam).all()
+    assert stored.plane is None or np.isfinite(stored.plane.normal).all()
+    assert stored.surface_config and sorted(stored.object_ids)
+
+
 READERS: list[Callable[[bytes], None]] = [
     npz,
     arrays,
@@ -169,6 +264,10 @@ READERS: list[Callable[[bytes], None]] = [
     shard,
     tables,
     images,
+    folders,
+    messages,
+    bag,
+    results,
 ]
 
 
@@ -204,7 +303,118 @@ def seeds() -> dict[str, list[bytes]]:
             b'\x02[descriptions]\ncup = "a cup"\n',
         ],
         "images": [picture.getvalue()],
+        "folders": [
+            bytes([i]) + (WORK / folder / name).read_bytes()
+            for i, (folder, name) in enumerate(REPLACED)
+        ],
+        "messages": [bytes(range(256)) * 3, b"\x00" * 700, b"\x01\x03\x06" * 200],
+        "bag": [small_bag()],
+        "results": [json.dumps(RECORD).encode()],
     }
+
+
+RECORD = {
+    "schema": 1,
+    "brrp": "0.1.0",
+    "frame": "camera",
+    "T_frame_cam": np.eye(4).tolist(),
+    "method": "brrp",
+    "plane_cam": {"normal": [0.0, -1.0, 0.0], "offset": 0.5},
+    "config": {"surface": {"level": 0.4}},
+    "objects": [
+        {"id": 7, "status": "ok", "message": "", "mesh": "object_7.ply", "uncertainty_unit": "x"},
+        {"id": 8, "status": "no_surface", "message": "none", "mesh": None},
+    ],
+}
+
+
+def small_bag() -> bytes:
+    """One colour image, one depth image and their camera_info."""
+    from rosbags.rosbag1 import Writer
+    from rosbags.typesys import Stores, get_typestore
+
+    store = get_typestore(Stores.ROS1_NOETIC)
+    types, time_type = store.types, store.types["builtin_interfaces/msg/Time"]
+    header = types["std_msgs/msg/Header"](seq=0, stamp=time_type(sec=1, nanosec=0), frame_id="c")
+
+    def image(encoding: str, size: int) -> object:
+        return types["sensor_msgs/msg/Image"](
+            header=header, height=6, width=6, encoding=encoding, is_bigendian=0, step=6 * size,
+            data=np.full(36 * size, 3, np.uint8),
+        )  # fmt: skip
+
+    roi = types["sensor_msgs/msg/RegionOfInterest"](
+        x_offset=0, y_offset=0, height=0, width=0, do_rectify=False
+    )
+    info = types["sensor_msgs/msg/CameraInfo"](
+        header=header, height=6, width=6, distortion_model="", D=np.zeros(5),
+        K=np.array([50.0, 0, 3, 0, 50, 3, 0, 0, 1]), R=np.zeros(9), P=np.zeros(12),
+        binning_x=0, binning_y=0, roi=roi,
+    )  # fmt: skip
+    path = WORK / "small.bag"
+    with Writer(path) as writer:
+        for topic, kind, message in (
+            ("/c/color/camera_info", "sensor_msgs/msg/CameraInfo", info),
+            ("/c/color/image", "sensor_msgs/msg/Image", image("rgb8", 3)),
+            ("/c/depth/image", "sensor_msgs/msg/Image", image("16UC1", 2)),
+        ):
+            connection = writer.add_connection(topic, kind, typestore=store)
+            writer.write(connection, 10**9, store.serialize_ros1(message, kind))
+    return path.read_bytes()
+
+
+def make_folders() -> None:
+    """Frames of 6 x 6 pixels in the layouts of `FOLDERS`."""
+    from PIL import Image
+
+    K = np.array([[50.0, 0, 3], [0, 50, 3], [0, 0, 1]])
+    rgb, depth = np.zeros((6, 6, 3), np.uint8), np.full((6, 6), 800, np.uint16)
+    ids = np.eye(6, dtype=np.uint8)
+    bop, tum, view, real, recording = (WORK / name for name in FOLDERS)
+
+    def save(array: np.ndarray, path: Path) -> None:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        if path.suffix == ".npy":
+            np.save(path, array)
+        else:
+            Image.fromarray(array).save(path)
+
+    (WORK / "models").mkdir()
+    save(rgb, bop / "rgb/000003.png")
+    save(depth, bop / "depth/000003.png")
+    save(ids * 255, bop / "mask_visib/000003_000000.png")
+    turn = np.eye(3).ravel().tolist()
+    camera = {"cam_K": K.ravel().tolist(), "depth_scale": 1.0}
+    camera |= {"cam_R_w2c": turn, "cam_t_w2c": [0, 0, 700.0]}
+    truth = [{"obj_id": 1, "cam_R_m2c": turn, "cam_t_m2c": [0, 0, 700.0]}]
+    (bop / "scene_camera.json").write_text(json.dumps({"3": camera}))
+    (bop / "scene_gt.json").write_text(json.dumps({"3": truth}))
+
+    save(rgb, tum / "rgb/1.5.png")
+    save((depth * 5), tum / "depth/1.49.png")
+    (tum / "rgb.txt").write_text("# colour\n1.5 rgb/1.5.png\n")
+    (tum / "depth.txt").write_text("1.49 depth/1.49.png\n")
+    (tum / "groundtruth.txt").write_text("1.501 1.5 0.25 1 0 0 0.7071 0.7071\n")
+
+    save(rgb, view / "rgb.jpg")
+    save(np.full((6, 6), 0.9, np.float32), view / "depth.npy")
+    save(ids, view / "seg_mask.npy")
+    projection = np.array([[1.0, 0, 0, 0], [0, 1, 0, 0], [0, 0, -1.02, -0.2], [0, 0, -1, 0]])
+    np.savez(view / "camera.npz", projection_matrix=projection, view_matrix=np.eye(4))
+    entry = {"id": 1, "mesh_path": "a.obj", "position": [0, 0, 0], "orientation": [0, 0, 0, 1]}
+    (view.parent / "objects.json").write_text(json.dumps([{**entry, "scale": [1, 1, 1]}]))
+
+    z = np.full((6, 6), 0.8, np.float32)
+    rows, columns = np.mgrid[:6, :6]
+    xyz = np.stack([(columns - 3) / 50 * z, (rows - 3) / 50 * z, z], axis=-1)
+    save(rgb, real / "rgb.jpg")
+    save(xyz.astype(np.float32), real / "xyz.npy")
+    save(ids, real / "segmentation.npy")
+
+    save(rgb, recording / "color/000000.jpg")
+    save(depth, recording / "depth/000000.png")
+    matrix = {"width": 6, "height": 6, "intrinsic_matrix": K.T.ravel().tolist()}
+    (recording / "camera_intrinsic.json").write_text(json.dumps(matrix))
 
 
 def examples() -> tuple[bytes, bytes, bytes]:
@@ -274,6 +484,7 @@ def main() -> None:
     options.findings.mkdir(parents=True, exist_ok=True)
     global MANIFEST, INDEX, SHARD
     MANIFEST, INDEX, SHARD = examples()
+    make_folders()
     if options.replay:
         for path in options.replay:
             one(path.read_bytes(), options.findings)

@@ -14,6 +14,7 @@ from brrp_cli.commands.export import CONFIDENCE, export
 from brrp_cli.commands.frame import refuse_existing
 from brrp_cli.commands.retriever_option import RetrieverName
 from brrp_cli.commands.source_options import SourceOptions, source_options
+from brrp_cli.commands.view import PAGE, title, view
 from brrp_cli.commands.weights_option import check_weights
 from brrp_cli.config import PRESETS, preset
 from brrp_cli.methods.registry import METHODS, RECONSTRUCTING
@@ -82,6 +83,8 @@ OF_A_PRIOR = ("prior_path", "preset_name", "k", "retriever", "clip_dir")
     type=CONFIDENCE,
     help="With --collision: shapes inside which each object lies with this probability.",
 )
+@click.option("--html", is_flag=True, help=f"Also what `brrp view` writes, OUT/{PAGE}.")
+@click.option("--view", "open_it", is_flag=True, help="The same, and open it in a browser.")
 @click.option("--overwrite", is_flag=True, help="Replace the output folder if it is there.")
 def command(
     source: SourceOptions,
@@ -99,6 +102,8 @@ def command(
     workers: int | None,
     collision: str,
     confidence: float | None,
+    html: bool,
+    open_it: bool,
     overwrite: bool,
 ) -> None:
     """Turn an RGBD frame into a closed mesh for every object.
@@ -114,7 +119,7 @@ def command(
     \b
     Example:
       brrp reconstruct frame.npz
-      brrp reconstruct --color c.png --depth d.png --intrinsics k.json
+      brrp reconstruct --color c.png --depth d.png --intrinsics k.json --view
       brrp reconstruct frame.npz --prior prior/ --preset paper -o out/ --seed 1
       brrp reconstruct frame.npz --method vprism
       brrp reconstruct frame.npz --method pointsdf --weights prior.safetensors
@@ -166,6 +171,8 @@ def command(
     if done and collision != NO_COLLISION:
         options = PlanOptions(collision, confidence, seed=seed)
         export(open_result(output), None, options, overwrite=False)
+    if html or open_it:
+        view(open_result(output), title(output), output / PAGE, open_it=open_it)
     if done < len(result.objects):
         sys.exit(SOME_FAILED)
 

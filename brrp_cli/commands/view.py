@@ -4,10 +4,16 @@ from __future__ import annotations
 
 import webbrowser
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
 from brrp_cli.progress import note
+
+if TYPE_CHECKING:
+    from brrp_cli.surface.stored import StoredResult
+
+PAGE = "view.html"
 
 
 @click.command("view")
@@ -17,7 +23,7 @@ from brrp_cli.progress import note
     "--output",
     metavar="PAGE.html",
     type=click.Path(path_type=Path),
-    help="[default: OUT/view.html]",
+    help=f"[default: OUT/{PAGE}]",
 )
 @click.option("--open/--no-open", "open_it", default=True, help="Open the page in a browser.")
 @click.option(
@@ -38,7 +44,6 @@ def command(results: Path, output: Path | None, open_it: bool, rerun: bool) -> N
       brrp view out/ --no-open -o page.html
       brrp view out/ --rerun
     """
-    from brrp_cli.files import write_bytes
     from brrp_cli.surface.stored import open_result
 
     stored = open_result(results)
@@ -47,10 +52,15 @@ def command(results: Path, output: Path | None, open_it: bool, rerun: bool) -> N
 
         show(stored, output, title(results))
         return
+    view(stored, title(results), output or stored.folder / PAGE, open_it=open_it)
+
+
+def view(stored: StoredResult, title: str, path: Path, *, open_it: bool) -> None:
+    """Write the page of results, and open it. Errors: those of `page`."""
+    from brrp_cli.files import write_bytes
     from brrp_cli.view.page import page
 
-    path = output or stored.folder / "view.html"
-    text = page(stored, title(results)).encode("utf-8")
+    text = page(stored, title).encode("utf-8")
     write_bytes(path, text)
     click.echo(f"Wrote {path} ({len(text) / 1e6:.1f} MB)")
     if open_it and not webbrowser.open(path.resolve().as_uri()):

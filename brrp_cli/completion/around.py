@@ -7,21 +7,15 @@ inside. network.py weighs them.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import distance_transform_edt
 from scipy.spatial import cKDTree
 
-from brrp_cli.completion.hull import hull_facets
-from brrp_cli.completion.roof import Roof, roof_over
-from brrp_cli.config import CompletionConfig
-from brrp_cli.frames.frame import BACKGROUND, Frame
+from brrp_cli.completion.hull import outside_hull
+from brrp_cli.completion.part import LEAST, MOST, SeenPart
+from brrp_cli.frames.frame import BACKGROUND
 from brrp_cli.frames.lookup import at_pixels, depth_behind
-from brrp_cli.frames.plane import Plane
-from brrp_cli.frames.subsample import grid_subsample
-from brrp_cli.geometry import normalise, transform_points
+from brrp_cli.geometry import transform_points
 
 Array = NDArray[np.float64]
 Features = NDArray[np.float32]
@@ -29,93 +23,10 @@ Features = NDArray[np.float32]
 # Lengths beyond these tell nothing more, metres; ratios of lengths likewise.
 FAR = 0.2
 RATIO = 4.0
-# Metres; smaller extents are as noisy as depth is.
-LEAST = 0.005
-# Shares of the seen points between which an object's size is taken: strays do not count.
-MOST = (0.02, 0.98)
-CHUNK = 512
-
-
-@dataclass(frozen=True)
-class SeenPart:
-    """One object as far as a frame shows it; metres, camera frame.
-
-    seen : (n, 3) observed points, thinned; feet : (m, 3) theirs on the plane, none without one
-    facets : (f, 4) of the hull of both, outward unit normal and offset; roof : None without a plane
-    size : diagonal of the box of the seen points; top : the height of the highest over the plane
-    ahead, across : (3,) unit directions along the plane, away from the camera and across; front,
-    back : where the seen points begin and end ahead; middle, width : of them across
-    depths : (n,) how deep the seen points lie in the hull: much of a cup's inside does
-    """
-
-    frame: Frame
-    object_id: int
-    plane: Plane | None
-    seen: Array
-    feet: Array
-    facets: Array
-    roof: Roof | None
-    size: float
-    top: float
-    ahead: Array
-    across: Array
-    front: float
-    back: float
-    middle: float
-    width: float
-    depths: Array
-
-    @property
-    def extent(self) -> Array:
-        """(n + m, 3) points that span what is likely to be the object."""
-        return np.concatenate([self.seen, self.feet])
-
-
-def seen_part(
-    points: NDArray[np.floating],
-    frame: Frame,
-    object_id: int,
-    plane: Plane | None,
-    config: CompletionConfig,
-) -> SeenPart:
-    """From an object's observed points (n, 3), metres, camera frame, and its support plane."""
-    seen = grid_subsample(points, config.cell).astype(np.float64)
-    low, high = np.quantile(seen, MOST, axis=0)
-    size = max(float(np.linalg.norm(high - low)), LEAST)
-    if plane is None:
-        # Upright in the image is as good a guess as any.
-        up = np.array([0.0, -1.0, 0.0])
-        feet, roof, top = np.zeros((0, 3)), None, size / 2
-    else:
-        up = plane.normal
-        height = np.maximum(plane.signed_distance(seen), 0.0)
-        feet = seen - height[:, None] * up
-        roof = roof_over(points, plane, config)
-        top = float(np.quantile(height, MOST[1]))
-    facets = hull_facets(np.concatenate([seen, feet]))
-    sight = seen.mean(axis=0)
-    across = normalise(np.cross(up, sight))
-    ahead = np.cross(across, up)
-    front, back = np.quantile(seen @ ahead, MOST)
-    left, right = np.quantile(seen @ across, MOST)
-    return SeenPart(
-        frame=frame,
-        object_id=object_id,
-        plane=plane,
-        seen=seen,
-        feet=feet,
-        facets=facets,
-        roof=roof,
-        size=size,
-        top=top,
-        ahead=ahead,
-        across=across,
-        front=float(front),
-        back=float(back),
-        middle=float(left + right) / 2,
-        width=max(float(right - left), LEAST),
-        depths=-_outside(seen, facets),
-    )
+# Metres, added to what a length is divided by that may be 0.
+THIN = 0.002
+# Lengths, of which the last are the object's own, the same at all points.
+COUNT, WHOLE = 52, 6
 
 
 def lengths(points: Array, part: SeenPart) -> Features:
@@ -126,11 +37,12 @@ def lengths(points: Array, part: SeenPart) -> Features:
     label = at_pixels(points, frame.segmap, frame)
     own = label == part.object_id
     ground = label == BACKGROUND
-    outline = np.nan_to_num(at_pixels(points, _within_outline(part), frame))
     # From pixels to metres at the point's own depth.
-    outline *= np.maximum(points[:, 2], 0) / frame.K[0, 0]
+    pixel = np.maximum(points[:, 2], 0) / frame.K[0, 0]
+    outline = np.nan_to_num(at_pixels(points, part.outline, frame)) * pixel
+    limb = np.nan_to_num(at_pixels(points, part.limbs, frame)) * pixel
 
-    outside = _outside(points, part.facets)
+    outside = outside_hull(points, part.facets)
     away, nearest = cKDTree(part.seen).query(points)
     if part.plane is None or part.roof is None:
         height = np.full(len(points), part.top)
@@ -148,8 +60,10 @@ def lengths(points: Array, part: SeenPart) -> Features:
     # As if what is seen were the front of something round.
     across = points @ part.across - part.middle
     ahead = points @ part.ahead - part.front
-    center = max(part.width, part.back - part.front) / 2
+    length = part.back - part.front
+    center = max(part.width, length) / 2
     round_ = np.hypot(across, ahead - center)
+    along = ((points - part.seen[nearest]) * part.normals[nearest]).sum(axis=1)
     each = [
         outside,
         away,
@@ -163,48 +77,45 @@ def lengths(points: Array, part: SeenPart) -> Features:
         np.abs(across),
         ahead,
         round_,
+        limb,
+        along,
+    ]
+    # Most things are the same from behind, or left and right.
+    mirrored = [
+        *_mirrored(points, 2 * (ahead - center), part.ahead, part),
+        *_mirrored(points, 2 * (ahead - length / 2), part.ahead, part),
+        *_mirrored(points, 2 * across, part.across, part),
     ]
     whole = [
         size / FAR,
         part.top / size,
         part.width / size,
-        (part.back - part.front) / size,
+        length / size,
         part.depths.mean() / size,
         np.quantile(part.depths, MOST[1]) / size,
     ]
-    columns = [np.clip(one / size, -RATIO, RATIO) for one in each]
+    columns = [np.clip(one / size, -RATIO, RATIO) for one in each + mirrored]
     columns += [np.clip(one, -FAR, FAR) / (FAR / 10) for one in each]
     columns += [
         own,
         ground,
-        np.clip(behind / (outline + 0.002), -RATIO, RATIO),
+        np.clip(behind / (outline + THIN), -RATIO, RATIO),
         np.clip(height / max(part.top, LEAST), -1, RATIO),
         np.clip(round_ / center, 0, RATIO),
+        np.clip(behind / (limb + THIN), -RATIO, RATIO),
+        part.normals[nearest] @ part.ahead,
+        np.abs(part.normals[nearest] @ part.across),
+        part.normals[nearest] @ part.up,
     ]
     columns += [np.full(len(points), one) for one in whole]
     return np.stack(columns, axis=1).astype(np.float32)
 
 
-COUNT = 35
-
-
-def _outside(points: Array, facets: Array) -> Array:
-    """Distance (n,) of points (n, 3) beyond the facets (f, 4), negative inside."""
-    # In float32 about the middle, and so many points at once that their products, one for each
-    # facet, stay in the cache.
-    middle = points.mean(axis=0)
-    near = (points - middle).astype(np.float32)
-    offsets = (facets[:, 3] + facets[:, :3] @ middle).astype(np.float32)
-    normals = np.ascontiguousarray(facets[:, :3].T, dtype=np.float32)
-    found = np.empty(len(points))
-    for start in range(0, len(points), CHUNK):
-        rows = slice(start, start + CHUNK)
-        found[rows] = (near[rows] @ normals + offsets).max(axis=1)
-    return found
-
-
-def _within_outline(part: SeenPart) -> NDArray[np.float32]:
-    """(H, W) pixels from each pixel to the nearest of the background, or of the image's edge; what
-    another object hides may go on."""
-    ground = np.pad(part.frame.segmap == BACKGROUND, 1, constant_values=True)
-    return distance_transform_edt(~ground)[1:-1, 1:-1].astype(np.float32)
+def _mirrored(points: Array, twice: Array, direction: Array, part: SeenPart) -> list[Array]:
+    """Where each point's image lies, `twice` its distance from the mirror back along the unit
+    `direction`: behind what is seen, within the outline, over the roof."""
+    image = points - twice[:, None] * direction
+    behind = np.clip(np.nan_to_num(-depth_behind(image, part.frame)), -FAR, FAR)
+    outline = np.nan_to_num(at_pixels(image, part.outline, part.frame))
+    over = np.full(len(points), -part.top) if part.roof is None else part.roof.above(image)
+    return [behind, outline * np.maximum(image[:, 2], 0) / part.frame.K[0, 0], over]

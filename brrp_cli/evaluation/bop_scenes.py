@@ -17,6 +17,7 @@ from brrp_cli.evaluation.truth import TrueObject
 from brrp_cli.frames.formats.bop import (
     MILLIMETRE,
     TRUTH,
+    mask_files,
     read_image,
     read_table,
     rigid,
@@ -50,7 +51,7 @@ def bop_scenes(path: Path) -> list[BopScene]:
 
 
 def _images(folder: Path) -> list[BopScene]:
-    masked = {int(mask.stem.partition("_")[0]) for mask in (folder / "mask_visib").glob("*_*.png")}
+    masked = {image for image, _ in mask_files(folder)}
     if not masked or not (folder / TRUTH).is_file():
         return []
     truth = read_table(folder / TRUTH)
@@ -61,7 +62,7 @@ def _images(folder: Path) -> list[BopScene]:
             folder=folder,
             objects=tuple(
                 _object(entry, place, models, f"{folder / TRUTH}: {image}, entry {place}")
-                for place, entry in enumerate(truth[image])
+                for place, entry in enumerate(_entries(truth[image], f"{folder / TRUTH}: {image}"))
             ),
             views=(folder,),
             image=image,
@@ -70,8 +71,16 @@ def _images(folder: Path) -> list[BopScene]:
     ]
 
 
+def _entries(found: object, where: str) -> list[object]:
+    if not isinstance(found, list):
+        raise SceneError(
+            "Not a list of objects", where=where, expected="a list", found=type(found).__name__
+        )
+    return found
+
+
 def _object(entry: object, place: int, models: str, where: str) -> TrueObject:
-    if not isinstance(entry, dict) or not isinstance(entry.get("obj_id"), int):
+    if not isinstance(entry, dict) or type(entry.get("obj_id")) is not int or entry["obj_id"] < 0:
         raise SceneError("Bad true object", where=where, expected="obj_id and a pose", found=entry)
     return TrueObject(
         id=1 + place,

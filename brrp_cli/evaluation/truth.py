@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brrp_cli.errors import SceneError
-from brrp_cli.files import parse_json
+from brrp_cli.files import is_file, parse_json
 from brrp_cli.geometry import similarity, transform_points
 
 
@@ -79,7 +79,7 @@ def true_mesh(true_object: TrueObject, data_root: Path | None) -> Any:
             fix="pass --data-root DATA",
         )
     path = data_root / true_object.mesh_path
-    if not path.is_file():
+    if not is_file(path):
         raise SceneError(
             "An object's true mesh does not exist" if data_root.is_dir() else "No such data folder",
             where=path if data_root.is_dir() else data_root,

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brrp_cli.errors import FrameError
+from brrp_cli.files import is_file
 
 # 12 megapixels as float32 points, uint8 colours and a mask fit; a 249 KB file can unpack to more.
 MAX_BYTES = 128 * 2**20
@@ -51,14 +52,19 @@ def _damage_told(where: object, expected: str) -> Iterator[None]:
 
 def check_file(path: Path) -> None:
     """FrameError unless `path` is a file."""
-    if not path.is_file():
-        raise FrameError(
-            "No such file" if not path.exists() else "Not a file",
-            where=path,
-            fix="check the path; a folder is read by `brrp frame FOLDER -o FRAME.npz`"
-            if path.is_dir()
-            else "check the path",
-        )
+    if is_file(path):
+        return
+    try:
+        there, folder = path.exists(), path.is_dir()
+    except OSError:  # a name that no file system takes
+        there, folder = False, False
+    raise FrameError(
+        "Not a file" if there else "No such file",
+        where=path,
+        fix="check the path; a folder is read by `brrp frame FOLDER -o FRAME.npz`"
+        if folder
+        else "check the path",
+    )
 
 
 def _read_header(stream: IO[bytes], where: str) -> tuple[tuple[int, ...], np.dtype[Any]]:

@@ -12,6 +12,8 @@ from brrp_cli.frames.frame import Frame
 
 T = TypeVar("T")
 
+_DIGITS = 19
+
 
 @dataclass(frozen=True)
 class Request:
@@ -51,12 +53,19 @@ class Format:
     title : as messages name it; layout : the files that tell it
     matches : whether a path looks like it, by names alone
     read : the frame, without masks where the format has none. Errors: FrameError
+    last : counts only where no other format matches
     """
 
     title: str
     layout: str
     matches: Callable[[Path], bool]
     read: Callable[[Path, Request], Frame]
+    last: bool = False
+
+
+def counted(index: str) -> int | None:
+    """The number that an index is; None where it is a name."""
+    return int(index) if index.isdecimal() and len(index) < _DIGITS else None
 
 
 def pick(items: list[T], index: str | None, names: list[str], path: Path) -> T:
@@ -70,8 +79,9 @@ def pick(items: list[T], index: str | None, names: list[str], path: Path) -> T:
         return items[0]
     if index in names:
         return items[names.index(index)]
-    if index.isdigit() and int(index) < len(items):
-        return items[int(index)]
+    number = counted(index)
+    if number is not None and number < len(items):
+        return items[number]
     shown = ", ".join(names[:4]) + (", ..." if len(names) > 4 else "")
     raise FrameError(
         "There is no such frame",

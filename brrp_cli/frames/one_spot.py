@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from brrp_cli.frames.one_colour import same_hue, vivid_hues
 from brrp_cli.frames.parts import contacts, relabel
 from brrp_cli.frames.table import convex_hull, in_hull
 
@@ -22,6 +23,7 @@ _SAME_RANGE = 0.3
 _STANDS = 0.04  # metres; what is nowhere lower does not stand on the table
 _OVER = 0.4  # of the smaller footprint, shared by what hangs on something and that
 _PIECES = 0.25  # of the smaller footprint, shared by pieces of one thing
+_COLOURED = 0.15  # of the smaller footprint, shared by pieces of one vivid colour
 
 
 @dataclass(frozen=True)
@@ -48,6 +50,7 @@ def join_on_one_spot(
     height: Array,
     plan_normals: Array,
     crease: Array,
+    rgb: NDArray[np.uint8],
     overlap: float,
 ) -> NDArray[np.int64]:
     """Labels (H, W) in which parts that belong together, though something lies between them in the
@@ -57,10 +60,12 @@ def join_on_one_spot(
     table nor lies over the lower one: a handle, the body of a drill. Of parts that do not, whose
     footprints share `overlap` of the smaller one, one may be the inside of the other: it faces the
     other's middle, as the far wall of a mug does. Or both are pieces of one thing, at one height.
+    Parts of one vivid colour that share some of their footprints are one thing however they meet:
+    the studs of a brick.
 
     plan : (H, W, 2) plan coordinates, height : (H, W) above the table, metres; plan_normals :
     (H, W, 2) the normals' part in the plan; crease : (H, W) hollow creases that are no jumps of
-    depth, 0 to 1
+    depth, 0 to 1; rgb : (H, W, 3)
     """
     count = int(parts.max()) + 1
     standing = {
@@ -68,6 +73,7 @@ def join_on_one_spot(
         for i in np.unique(parts[parts > 0])
     }
     touch = contacts(parts, crease)
+    hues = vivid_hues(parts, rgb)
     same = np.zeros((count, count), dtype=bool)
     for i, first in standing.items():
         for j, second in standing.items():
@@ -82,7 +88,9 @@ def join_on_one_spot(
                 pieces = shared > _PIECES and _at_one_height(first, second)
             inward = max(_inward(first, second), _inward(second, first))
             inside = inward > _INWARD and shared > overlap
-            same[i, j] = pieces or inside or _walls(first, second) or _walls(second, first)
+            coloured = shared > _COLOURED and same_hue(hues[i], hues[j])
+            walls = _walls(first, second) or _walls(second, first)
+            same[i, j] = pieces or inside or coloured or walls
     return relabel(parts, same)
 
 

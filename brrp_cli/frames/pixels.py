@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
@@ -17,14 +18,18 @@ from brrp_cli.frames.build import MAX_PIXELS
 _WIDE = ("I;16", "I;16B", "I;16L", "I;16N", "I", "F")
 
 
-def _open(path: Path, mode: str | None) -> tuple[NDArray[Any], str]:
-    check_file(path)
+def decode(source: Path | BytesIO, mode: str | None) -> tuple[NDArray[Any], str]:
+    """The pixels of an image file, converted to Pillow's `mode`, and the mode that they had.
+
+    Errors: FrameError, whatever the bytes are.
+    """
+    where = source if isinstance(source, Path) else None
     try:
-        with Image.open(path) as image:
+        with Image.open(source) as image:
             if image.width * image.height > MAX_PIXELS:
                 raise FrameError(
                     "The image is too large",
-                    where=path,
+                    where=where,
                     expected=f"at most {MAX_PIXELS} pixels",
                     found=f"{image.width} x {image.height}",
                 )
@@ -35,11 +40,16 @@ def _open(path: Path, mode: str | None) -> tuple[NDArray[Any], str]:
         # Pillow's readers raise whatever the damaged file made them stumble over.
         raise FrameError(
             "The image cannot be read",
-            where=path,
+            where=where,
             expected="a whole PNG, JPEG or TIFF",
-            found=str(error),
+            found=str(error) if where else "bytes that are no such image",
             fix="it is damaged, cut short or not what its name says: write or fetch it again",
         ) from error
+
+
+def _open(path: Path, mode: str | None) -> tuple[NDArray[Any], str]:
+    check_file(path)
+    return decode(path, mode)
 
 
 def read_colour(path: Path) -> NDArray[np.uint8]:

@@ -21,6 +21,12 @@ def known_formats() -> tuple[Format, ...]:
     return tuple(module.FORMAT for module in modules)
 
 
+def matching(path: Path) -> list[Format]:
+    """The formats that the path may be of."""
+    found = [one for one in known_formats() if one.matches(path)]
+    return [one for one in found if not one.last] or found
+
+
 def read_frame(
     path: str | Path, *, depth_scale: float | None = None, request: Request | None = None
 ) -> Frame:
@@ -35,7 +41,7 @@ def read_frame(
     request = request or Request(depth_scale=depth_scale)
     if not path.exists():
         raise FrameError("No such file or folder", where=path, fix="check the path")
-    found = [one for one in known_formats() if one.matches(path)]
+    found = matching(path)
     if len(found) == 1:
         return found[0].read(path, request)
     if found:

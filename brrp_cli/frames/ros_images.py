@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from brrp_cli.errors import FrameError
 from brrp_cli.frames.build import make_frame
 from brrp_cli.frames.frame import Frame
+from brrp_cli.frames.pixels import decode
 
 # encoding -> (type, channels, the channels that are red, green and blue)
 _COLOUR: dict[str, tuple[int, tuple[int, int, int]]] = {
@@ -39,7 +40,7 @@ def is_depth(message: Any) -> bool:
 def colour_of(message: Any) -> NDArray[np.uint8]:
     """(H, W, 3) uint8 RGB of an Image or CompressedImage message. Errors: FrameError."""
     if not hasattr(message, "encoding"):
-        return _decoded(bytes(message.data), "RGB").astype(np.uint8)
+        return decode(io.BytesIO(bytes(message.data)), "RGB")[0].astype(np.uint8)
     if message.encoding not in _COLOUR:
         raise _unknown(message.encoding, ", ".join(_COLOUR))
     channels, order = _COLOUR[message.encoding]
@@ -56,7 +57,7 @@ def depth_of(message: Any) -> NDArray[Any]:
         if "32FC1" in message.format:
             raise _unknown(message.format, "16UC1; compressedDepth", "record the raw depth topic")
         header = _DEPTH_HEADER if "compressedDepth" in message.format else 0
-        return _decoded(data[header:], None)
+        return decode(io.BytesIO(data[header:]), None)[0]
     if message.encoding not in _DEPTH:
         raise _unknown(message.encoding, ", ".join(_DEPTH))
     order = ">" if message.is_bigendian else "<"
@@ -112,16 +113,6 @@ def _rows(message: Any, kind: np.dtype[Any], channels: int) -> NDArray[Any]:
     rows = data[: message.step * message.height].reshape(message.height, message.step)[:, :length]
     pixels = np.ascontiguousarray(rows).view(kind)
     return pixels.reshape(message.height, message.width, channels).astype(kind.newbyteorder("="))
-
-
-def _decoded(data: bytes, mode: str | None) -> NDArray[Any]:
-    from PIL import Image, UnidentifiedImageError
-
-    try:
-        with Image.open(io.BytesIO(data)) as image:
-            return np.asarray(image.convert(mode) if mode else image)
-    except (UnidentifiedImageError, OSError, SyntaxError) as error:
-        raise FrameError("A compressed image cannot be read", found=str(error)) from error
 
 
 def _unknown(encoding: str, expected: str, fix: str | None = None) -> FrameError:

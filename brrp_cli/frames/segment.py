@@ -2,7 +2,7 @@
 
 Depth is smoothed and freed of flying pixels. What rises above the table is cut at jumps of depth
 and at hollow creases, which is how things that touch meet; parts of which one is the inside of the
-other (a mug's walls) are joined again.
+other (a mug's walls), or that are of one vivid colour on one spot, are joined again.
 """
 
 from __future__ import annotations
@@ -81,7 +81,9 @@ def segment(frame: Frame, seed: int = 0, config: SegmentConfig | None = None) ->
     meets = np.where(ndimage.binary_dilation(jumps, iterations=2), 0.0, crease)
     parts = find_parts(risen, boundary)
     parts = join_parts(parts, boundary, config.border)
-    parts = join_on_one_spot(parts, plan, height, table.plan(normals), meets, config.overlap)
+    parts = join_on_one_spot(
+        parts, plan, height, table.plan(normals), meets, frame.rgb, config.overlap
+    )
     small = _areas(parts, frame) < config.min_area
     segmap = absorb_small(parts, boundary, small)
     # Pixels at edges, which were left out of the smoothed depth, join what they lie next to.

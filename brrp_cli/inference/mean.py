@@ -14,8 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import binary_dilation, map_coordinates
 
-from brrp_cli.completion.around import SeenPart, lengths
+from brrp_cli.completion.around import lengths
 from brrp_cli.completion.network import fitted
+from brrp_cli.completion.part import SeenPart
 from brrp_cli.config import MeanConfig
 from brrp_cli.frames.frame import BACKGROUND, Frame
 from brrp_cli.frames.lookup import at_pixels, depth_behind

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from brrp_cli.completion.around import seen_part
+from brrp_cli.completion.part import seen_part
 from brrp_cli.config import Config, HypothesesConfig, WeighConfig
 from brrp_cli.frames.frame import Frame
 from brrp_cli.frames.observe import ObjectObservation

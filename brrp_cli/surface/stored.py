@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -13,12 +12,13 @@ from numpy.typing import NDArray
 
 from brrp_cli.config import SurfaceConfig
 from brrp_cli.errors import ResultError
+from brrp_cli.files import parse_json
 from brrp_cli.frames.frame import Frame
 from brrp_cli.frames.npz import load_frame
 from brrp_cli.frames.plane import Plane
 from brrp_cli.geometry import transform_points
 from brrp_cli.methods.base import OccupancyPosterior, Surface
-from brrp_cli.surface.results import FRAME, POSTERIOR, RECORD, SCHEMA
+from brrp_cli.surface.results import FRAME, POSTERIOR, RECORD, SCHEMA, mesh_name
 
 if TYPE_CHECKING:
     import trimesh
@@ -111,7 +111,7 @@ def open_result(folder: str | Path) -> StoredResult:
         folder = folder / INSIDE_DEMO
     path = folder / RECORD
     try:
-        record = json.loads(path.read_text())
+        record = parse_json(path.read_text(encoding="utf-8"))
     except (OSError, ValueError) as error:
         raise ResultError(
             "There are no results that can be read",
@@ -129,7 +129,65 @@ def open_result(folder: str | Path) -> StoredResult:
         raise ResultError(
             "The results lack the frame that they are of", where=folder, expected=FRAME, fix=AGAIN
         )
+    try:
+        _check(record)
+    except (AttributeError, KeyError, TypeError, ValueError) as error:
+        raise ResultError(
+            "The record of the results is damaged",
+            where=path,
+            expected="what `brrp reconstruct` wrote",
+            found=f"{type(error).__name__}: {error}",
+            fix=AGAIN,
+        ) from error
     return StoredResult(folder, record)
+
+
+def _check(record: dict[str, Any]) -> None:
+    """Whether everything that is read of a record is there.
+
+    Errors: AttributeError, KeyError, TypeError, ValueError.
+    """
+    T = _numbers(record["T_frame_cam"], (4, 4))
+    if not np.allclose(T[:3, :3] @ T[:3, :3].T, np.eye(3), atol=1e-3):
+        raise ValueError("T_frame_cam is no rigid transform")
+    if record["frame"] not in ("camera", "world"):
+        raise ValueError(f"frame {record['frame']!r}")
+    for key in ("method", "brrp"):
+        _text(record[key])
+    for key in ("retriever", "seed"):
+        record[key]
+    plane = record["plane_cam"]
+    if plane is not None:
+        if abs(np.linalg.norm(_numbers(plane["normal"], (3,))) - 1) > 1e-3:
+            raise ValueError("the plane's normal is no unit vector")
+        _numbers(plane["offset"], ())
+    for name, value in record["config"]["surface"].items():
+        if not _numbers(value, ()) > 0:
+            raise ValueError(f"surface {name} {value!r:.60}")
+    SurfaceConfig(**record["config"]["surface"])
+    ids = [item["id"] for item in record["objects"]]
+    if not all(type(i) is int for i in ids) or len(set(ids)) < len(ids):
+        raise ValueError(f"ids {ids[:10]}")
+    for item in record["objects"]:
+        _text(item["status"])
+        _text(item["message"])
+        if item["mesh"] is not None:
+            # A name of another's making could lead out of the folder.
+            if item["mesh"] != mesh_name(item["id"]):
+                raise ValueError(f"mesh {item['mesh']!r}")
+            _text(item["uncertainty_unit"])
+
+
+def _numbers(value: Any, shape: tuple[int, ...]) -> NDArray[np.float64]:
+    array = np.asarray(value, dtype=np.float64)
+    if array.shape != shape or not np.isfinite(array).all():
+        raise ValueError(f"{value!r:.60} is not {shape} finite numbers")
+    return array
+
+
+def _text(value: Any) -> None:
+    if not isinstance(value, str):
+        raise TypeError(f"{value!r:.60} is no text")
 
 
 def _read_mesh(path: Path) -> trimesh.Trimesh:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import base64
 import json
+import re
 
 import numpy as np
 import pytest
@@ -44,11 +46,17 @@ def files(folder):
     ]  # fmt: skip
 
 
-def test_images_become_meshes_in_one_command(images, tmp_path, caplog):
+def test_images_become_meshes_and_a_page_in_one_command(images, tmp_path, caplog, monkeypatch):
+    opened = []
+    monkeypatch.setattr("webbrowser.open", lambda address: opened.append(address) or True)
     out = tmp_path / "out"
     with caplog.at_level("INFO"):
-        result = run(*files(images), "-o", out)
+        result = run(*files(images), "-o", out, "--collision", "hull", "--view")
     assert result.exit_code == 0, result.output
+    assert opened == [(out / "view.html").resolve().as_uri()]
+    # The page shows the collision shapes too: they are made before it.
+    glb = re.search(r'<script[^>]* id="glb">(.*?)</script>', (out / "view.html").read_text(), re.S)
+    assert b"plan_object_2_part_0" in base64.b64decode(glb[1])
     assert len(list(out.glob("object_*.ply"))) == 2
     assert load_frame(out / "frame.npz").object_ids == [1, 2]
     assert (tmp_path / "out.masks.png").is_file()
@@ -73,10 +81,12 @@ def test_a_folder_becomes_meshes_beside_it(images):
     assert "--overwrite" in refused.output
 
 
-def test_masks_that_are_given_are_used(images, tmp_path):
+def test_masks_that_are_given_are_used_and_a_page_may_stay_closed(images, tmp_path, monkeypatch):
+    monkeypatch.setattr("webbrowser.open", lambda address: pytest.fail("it was opened"))
     out = tmp_path / "out"
-    result = run(*files(images), "--masks", images / "m.png", "-o", out)
+    result = run(*files(images), "--masks", images / "m.png", "-o", out, "--html")
     assert result.exit_code == 0, result.output
+    assert str(out / "view.html") in result.output and (out / "view.html").is_file()
     assert not (tmp_path / "out.masks.png").exists()
 
 

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 from table_scene import TABLE, box, in_camera, photograph, placed
 
-from brrp_cli.completion.around import COUNT, lengths, seen_part
+from brrp_cli.completion.around import COUNT, lengths
 from brrp_cli.completion.network import Network, fitted, from_bytes
+from brrp_cli.completion.part import seen_part
 from brrp_cli.config import CompletionConfig, MeanConfig
 from brrp_cli.frames.plane import Plane
 from brrp_cli.geometry import transform_points

@@ -5,16 +5,20 @@ from __future__ import annotations
 import io
 import json
 import logging
+import sys
 from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 from PIL import Image
 
+from brrp_cli.cli import main
 from brrp_cli.errors import FrameError
+from brrp_cli.frames import formats
 from brrp_cli.frames.format import Request
-from brrp_cli.frames.readers import known_formats, read_frame
+from brrp_cli.frames.readers import known_formats, matching, read_frame
 from brrp_cli.frames.ros_images import colour_of, depth_of, frame_of
 
 IDS = {7: 1, 250: 2, -3: 3}
@@ -73,6 +77,36 @@ def test_every_format_has_a_name_and_a_layout():
     assert len(known_formats()) >= 9
     assert len({one.title for one in known_formats()}) == len(known_formats())
     assert all(one.layout for one in known_formats())
+
+
+MINE = """
+from brrp_cli.frames.format import Format
+from brrp_cli.frames.images import read_images
+
+def read(folder, request):
+    parts = (folder / "color" / "0.png", folder / "depth" / "0.png", folder / "mine.json")
+    return read_images(*parts, depth_scale=0.0005)
+
+FORMAT = Format("my recorder", "mine.json", lambda path: (path / "mine.json").is_file(), read)
+"""
+
+
+def test_a_new_format_is_one_new_file(scene, tmp_path, monkeypatch):
+    """Though its folders are those that any folder of frames may have."""
+    home, dump = tmp_path / "home", tmp_path / "dump"
+    home.mkdir()
+    (home / "made_for_this_test.py").write_text(MINE)
+    write_images(dump / "color" / "0.png", dump / "depth" / "0.png", scene, 2000)
+    (dump / "mine.json").write_text(json.dumps({"K": scene.K.tolist()}))
+    monkeypatch.setattr(formats, "__path__", [*formats.__path__, str(home)])
+    known_formats.cache_clear()
+    try:
+        assert_the_scene(read_frame(dump), scene)
+        result = CliRunner().invoke(main, ["frame", str(tmp_path), "-o", str(tmp_path / "f.npz")])
+        assert "my recorder (mine.json)" in result.output, "what is known is listed"
+    finally:
+        known_formats.cache_clear()
+        sys.modules.pop(f"{formats.__name__}.made_for_this_test", None)
 
 
 @pytest.mark.parametrize("below", ["", "test", "test/000048"])
@@ -176,7 +210,7 @@ def test_recordings_of_open3d_are_read(scene, tmp_path, caplog, intrinsics, digi
         frame = read_frame(tmp_path, request=Request(index="1"))
     assert_the_scene(frame, scene)
     assert "millimetres" in caplog.text
-    assert title in next(one.title for one in known_formats() if one.matches(tmp_path))
+    assert [title in one.title for one in matching(tmp_path)] == [True]
     quarter = read_frame(tmp_path, depth_scale=0.00025)
     assert quarter.points[frame.valid][:, 2] == pytest.approx(
         scene.depth[frame.valid] / 4, abs=1e-3

@@ -109,3 +109,28 @@ def test_a_bag_without_depth_and_a_damaged_one_are_told(scene, tmp_path):
     (tmp_path / "d.bag").write_bytes(b"#ROSBAG V2.0\njunk")
     with pytest.raises(FrameError, match="bag cannot be read"):
         read_frame(tmp_path / "d.bag")
+
+
+@pytest.mark.parametrize("ros1", [True, False], ids=["ros1", "ros2"])
+def test_a_damaged_bag_is_read_or_refused(scene, tmp_path, ros1):
+    path = write(scene, tmp_path / ("a.bag" if ros1 else "bag"), ros1)
+    file = path if ros1 else next(path.glob("*.db3"))
+    whole, rng = file.read_bytes(), np.random.default_rng(0)
+    # Headers and indices are a small part of it: half of the bits are flipped among them.
+    ends = [*range(4000), *range(len(whole) - 4000, len(whole))]
+    places = [*rng.integers(len(whole), size=20), *rng.choice(ends, 20)]
+    for place in places:
+        data = bytearray(whole)
+        data[place] ^= 1 << rng.integers(8)
+        file.write_bytes(data)
+        try:
+            read_frame(path)
+        except FrameError:
+            continue
+    for part in range(8):
+        file.write_bytes(whole[: len(whole) * part // 8])
+        with pytest.raises(FrameError):
+            read_frame(path)
+    for index in ("abc", "²", "-1", 5000 * "9"):
+        with pytest.raises(FrameError):
+            read_frame(path, request=Request(index=index))

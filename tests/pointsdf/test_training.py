@@ -130,9 +130,6 @@ def test_scenes_are_held_out():
     assert [len(part) for part in split(["a", "b"], 0.0, seed=0)] == [1, 1]
 
 
-@pytest.mark.xfail(
-    strict=True, reason="0.85 after these 500 steps, 0.88 after 1,000: not there yet"
-)
 def test_eight_objects_are_learnt_by_heart(learnt):
     """And so is what lies between the points that the training asked."""
     network = load_weights(learnt.weights).network

@@ -7,7 +7,7 @@ of scene_gt.json.
 
 from __future__ import annotations
 
-import json
+import re
 from pathlib import Path
 from typing import Any
 
@@ -15,22 +15,24 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brrp_cli.errors import FrameError
+from brrp_cli.files import parse_json
 from brrp_cli.frames.build import make_frame
-from brrp_cli.frames.format import Format, Request, pick
+from brrp_cli.frames.format import Format, Request, counted, pick
 from brrp_cli.frames.frame import Frame
 from brrp_cli.frames.pixels import read_colour, read_depth, read_masks
 
 CAMERA, TRUTH = "scene_camera.json", "scene_gt.json"
 MILLIMETRE = 0.001
 _COLOURS = ("rgb", "gray")
+_TURNED = 1e-2  # of R R^T: data sets round their rotations
 _ENDINGS = (".png", ".jpg", ".tif", ".tiff")
 
 
 def read_table(path: Path) -> dict[int, Any]:
     """One of a scene's JSON files: image number -> entry. Errors: FrameError."""
     try:
-        table = json.loads(path.read_text(encoding="utf-8"))
-        return {int(image): entry for image, entry in table.items()}
+        table = parse_json(path.read_text(encoding="utf-8"))
+        return {_number(image): entry for image, entry in table.items()}
     except (OSError, ValueError, AttributeError) as error:
         raise FrameError(
             "The scene's file cannot be read",
@@ -40,12 +42,25 @@ def read_table(path: Path) -> dict[int, Any]:
         ) from error
 
 
+def _number(text: str) -> int:
+    """Image numbers are part of file names. Errors: ValueError."""
+    if not re.fullmatch(r"[0-9]{1,18}", text):
+        raise ValueError(f"{text[:20]!r} is no image's number")
+    return int(text)
+
+
 def rigid(entry: dict[str, Any], rotation: str, translation: str, where: object) -> NDArray[Any]:
-    """(4, 4), metres, of a rotation (9 numbers, row by row) and a translation in millimetres."""
+    """(4, 4), metres, of a rotation (9 numbers, row by row) and a translation in millimetres.
+
+    Errors: FrameError, also where it is no rotation.
+    """
     T = np.eye(4)
     try:
         T[:3, :3] = np.reshape(np.array(entry[rotation], dtype=np.float64), (3, 3))
         T[:3, 3] = np.reshape(np.array(entry[translation], dtype=np.float64), 3) * MILLIMETRE
+        turned = T[:3, :3] @ T[:3, :3].T
+        if not (np.isfinite(T).all() and np.allclose(turned, np.eye(3), atol=_TURNED)):
+            raise ValueError("no rotation")
     except (KeyError, TypeError, ValueError) as error:
         raise FrameError(
             "A pose cannot be read",
@@ -68,9 +83,16 @@ def read_image(folder: Path, image: int) -> Frame:
         raise FrameError("The image has no camera", where=where, expected="cam_K", found=camera)
     if "depth_scale" not in camera:
         raise FrameError("The image has no depth_scale", where=where, found=", ".join(camera))
-    K = np.array(camera["cam_K"], dtype=np.float64)
-    if K.size != 9:
-        raise FrameError("cam_K is no matrix", where=where, expected="9 numbers", found=K.size)
+    try:
+        K = np.reshape(np.array(camera["cam_K"], dtype=np.float64), (3, 3))
+        millimetres = float(camera["depth_scale"])
+    except (TypeError, ValueError) as error:
+        raise FrameError(
+            "The image's camera cannot be read",
+            where=where,
+            expected="cam_K, 9 numbers; depth_scale, a number",
+            found=f"{type(error).__name__}: {error}",
+        ) from error
     T_world_cam = None
     if "cam_R_w2c" in camera and "cam_t_w2c" in camera:
         T_world_cam = np.linalg.inv(rigid(camera, "cam_R_w2c", "cam_t_w2c", where))
@@ -78,9 +100,9 @@ def read_image(folder: Path, image: int) -> Frame:
         read_colour(_image_file(folder, _COLOURS, image)),
         _masks(folder, image),
         depth=read_depth(_image_file(folder, ("depth",), image)),
-        K=K.reshape(3, 3),
+        K=K,
         T_world_cam=T_world_cam,
-        depth_scale=float(camera["depth_scale"]) * MILLIMETRE,
+        depth_scale=millimetres * MILLIMETRE,
         source=folder / f"{image:06d}",
     )
 
@@ -100,9 +122,8 @@ def _image_file(folder: Path, kinds: tuple[str, ...], image: int) -> Path:
 
 def _masks(folder: Path, image: int) -> NDArray[np.int64] | None:
     """Ids (H, W) of the visible parts; None where the data set has no masks."""
-    files = sorted((folder / "mask_visib").glob(f"{image:06d}_*.png"))
     ids: NDArray[np.int64] | None = None
-    for path in files:
+    for (_, instance), path in sorted(mask_files(folder, image).items()):
         visible = read_masks(path) > 0
         if ids is None:
             ids = np.zeros(visible.shape, np.int64)
@@ -113,8 +134,23 @@ def _masks(folder: Path, image: int) -> NDArray[np.int64] | None:
                 expected=ids.shape,
                 found=visible.shape,
             )
-        ids[visible] = 1 + int(path.stem.partition("_")[2])
+        ids[visible] = 1 + instance
     return ids
+
+
+def mask_files(folder: Path, image: int | None = None) -> dict[tuple[int, int], Path]:
+    """(image, instance) -> file of the visible masks, of one image or of all. Errors: FrameError
+    for a name that tells no numbers."""
+    pattern = "*_*.png" if image is None else f"{image:06d}_*.png"
+    found = {}
+    for path in (folder / "mask_visib").glob(pattern):
+        numbers = re.fullmatch(r"([0-9]{1,18})_([0-9]{1,9})", path.stem)
+        if numbers is None:
+            raise FrameError(
+                "A mask's name tells no numbers", where=path, expected="IMAGE_INSTANCE.png"
+            )
+        found[int(numbers[1]), int(numbers[2])] = path
+    return found
 
 
 def scene_folders(path: Path) -> list[Path]:
@@ -140,15 +176,15 @@ def read(path: Path, request: Request) -> Frame:
     images = sorted(read_table(scene / CAMERA))
     # Images go by the number that they have, not by their place.
     names = [str(image) for image in images]
-    if index is not None and index.isdigit() and str(int(index)) not in names:
+    number = None if index is None else str(counted(index))
+    if number is not None and number not in names:
         raise FrameError(
             "The scene has no such image",
             where=scene,
             expected=", ".join(names[:8]) + (", ..." if len(names) > 8 else ""),
             found=index,
         )
-    chosen = pick(images, None if index is None else str(int(index)), names, scene)
-    return read_image(scene, chosen)
+    return read_image(scene, pick(images, number, names, scene))
 
 
 FORMAT = Format(

@@ -12,15 +12,12 @@ from pathlib import Path
 from brrp_cli.errors import FrameError
 from brrp_cli.frames.dump import COLOUR_ENDINGS, DEPTH_ENDINGS, by_name, images_in, read_pair
 from brrp_cli.frames.format import Format, Request
-from brrp_cli.frames.formats import azure_kinect, bop, brrp_real, published_view, realsense, tum
 from brrp_cli.frames.frame import Frame
 
 _COLOUR = re.compile(r"^(.*?)[-_.]?(?:color|colour|rgb)$", re.IGNORECASE)
 _DEPTH = re.compile(r"^(.*?)[-_.]?depth$", re.IGNORECASE)
 _CAMERA = re.compile(r"camera|intrinsic|calib|^k$", re.IGNORECASE)
 _COLOUR_FOLDERS = ("color", "colour", "rgb", "image", "images")
-# What has a reader of its own is not read as just any folder.
-_OWN = (azure_kinect, bop, brrp_real, published_view, realsense, tum)
 
 
 def pairs_in(folder: Path) -> dict[str, tuple[Path, Path]]:
@@ -71,8 +68,7 @@ def read(folder: Path, request: Request) -> Frame:
 FORMAT = Format(
     title="a folder of frames",
     layout="color.png, depth.png; NAME-color.png, NAME-depth.png; or color/NAME, depth/NAME",
-    matches=lambda path: (
-        path.is_dir() and not any(own.FORMAT.matches(path) for own in _OWN) and bool(pairs_in(path))
-    ),
+    matches=lambda path: path.is_dir() and bool(pairs_in(path)),
     read=read,
+    last=True,
 )

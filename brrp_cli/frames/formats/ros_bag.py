@@ -12,8 +12,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from brrp_cli.errors import DependencyError, FrameError
-from brrp_cli.frames.format import Format, Request
+from brrp_cli.errors import BrrpError, DependencyError, FrameError
+from brrp_cli.frames.format import Format, Request, counted
 from brrp_cli.frames.frame import Frame
 from brrp_cli.frames.ros_images import frame_of, is_depth
 
@@ -38,17 +38,17 @@ def read(path: Path, request: Request) -> Frame:
     have to name them. Errors: FrameError; DependencyError without `rosbags`.
     """
     request.refuse(path, "the bag's camera_info", intrinsics="--intrinsics")
-    index = request.index or "0"
-    if not index.isdigit():
+    index = counted(request.index or "0")
+    if index is None:
         raise FrameError(
-            "A bag's frames are counted", where=path, expected="0, 1, ...", found=index
+            "A bag's frames are counted", where=path, expected="0, 1, ...", found=request.index
         )
-    with _opened(path) as reader:
+    with _damage_told(path), _opened(path) as reader:
         choice = _choose(reader, request, path)
         log.info("Topics: %s, %s, %s", choice.color, choice.depth, choice.info)
         info = next((message for _, message in _messages(reader, choice.info)), None)
         color = next(
-            (pair for i, pair in enumerate(_messages(reader, choice.color)) if i == int(index)),
+            (pair for i, pair in enumerate(_messages(reader, choice.color)) if i == index),
             None,
         )
         if info is None or color is None:
@@ -74,6 +74,22 @@ def read(path: Path, request: Request) -> Frame:
 
 
 @contextmanager
+def _damage_told(path: Path) -> Iterator[None]:
+    try:
+        yield
+    except BrrpError:
+        raise
+    except Exception as error:  # the library's errors have no common base
+        raise FrameError(
+            "The bag cannot be read",
+            where=path,
+            expected="a whole ROS 1 .bag, or a ROS 2 bag's folder with metadata.yaml",
+            found=f"{type(error).__name__}: {error}",
+            fix="reindex it: rosbag reindex (ROS 1), ros2 bag reindex (ROS 2)",
+        ) from error
+
+
+@contextmanager
 def _opened(path: Path) -> Iterator[Any]:
     try:
         from rosbags.highlevel import AnyReader
@@ -87,18 +103,8 @@ def _opened(path: Path) -> Iterator[Any]:
         ) from error
     # Older ROS 2 bags do not bring the definitions of their messages.
     folder = path if path.is_dir() or path.suffix == ".bag" else path.parent
-    reader: Any = None
-    try:
-        reader = AnyReader([folder], default_typestore=get_typestore(Stores.ROS2_HUMBLE))
-        reader.open()
-    except Exception as error:  # the library's errors have no common base
-        raise FrameError(
-            "The bag cannot be read",
-            where=path,
-            expected="a whole ROS 1 .bag, or a ROS 2 bag's folder with metadata.yaml",
-            found=error,
-            fix="reindex it: rosbag reindex (ROS 1), ros2 bag reindex (ROS 2)",
-        ) from error
+    reader = AnyReader([folder], default_typestore=get_typestore(Stores.ROS2_HUMBLE))
+    reader.open()
     try:
         yield reader
     finally:

@@ -101,25 +101,25 @@ def _pose(path: Path, time: float) -> NDArray[np.float64] | None:
     """T_world_cam (4, 4) nearest in time; None where there is none within 0.02 s."""
     if not path.is_file():
         return None
+    rotation = import_library("scipy.spatial.transform").Rotation
     try:
         rows = np.atleast_2d(np.loadtxt(path, comments="#", dtype=np.float64))
         if rows.shape[1] != 8:
             raise ValueError(f"{rows.shape[1]} columns")
-    except ValueError as error:
+        near = rows[np.argmin(np.abs(rows[:, 0] - time))]
+        if not abs(near[0] - time) <= _APART:
+            return None
+        T = np.eye(4)
+        T[:3, :3] = rotation.from_quat(near[4:8]).as_matrix()
+        T[:3, 3] = near[1:4]
+        return T
+    except (OSError, ValueError) as error:
         raise FrameError(
             "The poses cannot be read",
             where=path,
             expected="lines of time tx ty tz qx qy qz qw",
             found=error,
         ) from error
-    row = rows[np.argmin(np.abs(rows[:, 0] - time))]
-    if abs(row[0] - time) > _APART:
-        return None
-    rotation = import_library("scipy.spatial.transform").Rotation
-    T = np.eye(4)
-    T[:3, :3] = rotation.from_quat(row[4:8]).as_matrix()
-    T[:3, 3] = row[1:4]
-    return T
 
 
 FORMAT = Format(
