@@ -122,7 +122,7 @@ class SearchConfig:
     matching: RegistrationConfig = field(
         default_factory=lambda: RegistrationConfig(iterations=10_000)
     )
-    coarse: int = 48
+    coarse: int = 96
     coarse_distance: float = 0.03
     coarse_points: int = 400
     fine: int = 8

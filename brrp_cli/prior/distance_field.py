@@ -41,6 +41,41 @@ class DistanceField:
         inside = map_coordinates(self.values, within.T, order=1, mode="nearest", output=np.float64)
         return np.asarray(inside + beyond)
 
+    def distance_and_slope(
+        self, points: NDArray[np.float32]
+    ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+        """Distance (n,) at points (3, n), as `signed_distance` has it, and its gradient (3, n)."""
+        shape = np.array(self.values.shape, dtype=np.int32)[:, None]
+        at = (points - self.lower[:, None].astype(np.float32)) / np.float32(self.spacing)
+        within = np.clip(at, 0, (shape - 1).astype(np.float32))
+        cell = np.minimum(within.astype(np.int32), shape - 2)
+        x, y, z = within - cell
+        on_x, on_y = int(shape[1, 0] * shape[2, 0]), int(shape[2, 0])
+        first = cell[0] * on_x + cell[1] * on_y + cell[2]
+        nodes = self.values.ravel()
+        # Along z, then y, then x; the slope along an axis is the difference along it.
+        low = [nodes.take(first + step) for step in (0, on_y, on_x, on_x + on_y)]
+        rise = [
+            nodes.take(first + (step + 1)) - start
+            for step, start in zip((0, on_y, on_x, on_x + on_y), low, strict=True)
+        ]
+        edges = [start + z * up for start, up in zip(low, rise, strict=True)]
+        left, right = edges[1] - edges[0], edges[3] - edges[2]
+        near, far = edges[0] + y * left, edges[2] + y * right
+        up_near, up_far = rise[0] + y * (rise[1] - rise[0]), rise[2] + y * (rise[3] - rise[2])
+        along = far - near
+        value = near + x * along
+        slope = np.stack([along, left + x * (right - left), up_near + x * (up_far - up_near)])
+        slope /= np.float32(self.spacing)
+        off = at - within
+        beyond = np.flatnonzero(off.any(axis=0))
+        if len(beyond):
+            off = off[:, beyond]
+            way = np.linalg.norm(off, axis=0)
+            value[beyond] += way * np.float32(self.spacing)
+            slope[:, beyond] = np.where(off != 0, off / way, slope[:, beyond])
+        return value, slope
+
 
 def distance_field(mesh: trimesh.Trimesh, config: FieldConfig) -> DistanceField:
     """The field of a closed mesh on about `config.nodes` nodes, which reach `config.margin` beyond

@@ -62,6 +62,15 @@ def match_repeatedly(
     return found
 
 
+def match_pairs(source: FeatureCloud, target: FeatureCloud) -> NDArray[np.int64]:
+    """Rows (m, 2) of source and target: for each source point the target's with the most similar
+    feature."""
+    matched = import_open3d().pipelines.registration.correspondences_from_features(
+        _feature(source), _feature(target), False
+    )
+    return np.asarray(matched, dtype=np.int64).reshape(-1, 2)
+
+
 def _cloud(cloud: FeatureCloud) -> object:
     o3d = import_open3d()
     return o3d.geometry.PointCloud(o3d.utility.Vector3dVector(cloud.points))

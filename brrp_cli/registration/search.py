@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from brrp_cli.config import FeatureConfig, SearchConfig
 from brrp_cli.geometry import transform_points
+from brrp_cli.registration.descend import descend
 from brrp_cli.registration.model import COARSE, FINE, Model
 from brrp_cli.registration.refine import refine
 from brrp_cli.registration.scan import ObservedCloud
@@ -55,7 +56,7 @@ def search(
     if testimony.plane is not None:
         starts += resting_starts(model, testimony.points, testimony.plane, config.turns)
     T = _best(np.stack(starts), model, testimony, config, config.coarse)
-    T = _refined(T, 1.0, model, testimony, config.coarse_distance, config.coarse_points)
+    T = _slid(T, 1.0, model, testimony, config.coarse_distance, config.coarse_points)
     T = _best(T, model, testimony, config, config.fine)
     T = _refined(T, 1.0, model, testimony, config.fine_distance, config.fine_points)
     found = _judged(T, 1.0, model, testimony, config)
@@ -113,6 +114,20 @@ def _judged(
     score = score - config.scale_cost * np.log(scale) ** 2
     found = [Hypothesis(model, T, scale, float(s)) for T, s in zip(T_cam_model, score, strict=True)]
     return sorted(found, key=lambda each: -each.evidence)
+
+
+def _slid(
+    T_cam_model: Array,
+    scale: float,
+    model: Model,
+    testimony: Testimony,
+    distance: float,
+    points: int,
+) -> Array:
+    """Each placement (B, 4, 4), of one scale, with so many observed points brought onto its
+    surface; those further from it than `distance` metres do not pull."""
+    T_model_cam = np.linalg.inv(T_cam_model)
+    return np.linalg.inv(descend(T_model_cam, testimony.points[:points], model, distance / scale))
 
 
 def _refined(

@@ -8,10 +8,11 @@ from numpy.typing import NDArray
 from brrp_cli.config import FeatureConfig, RegistrationConfig
 from brrp_cli.frames.plane import Plane, plane_frame
 from brrp_cli.geometry import normalise, similarity, transform_points
+from brrp_cli.registration.draws import drawn_motions
 from brrp_cli.registration.model import COARSE, Model
-from brrp_cli.registration.ransac import match_repeatedly
+from brrp_cli.registration.ransac import match_pairs
 from brrp_cli.registration.scan import ObservedCloud
-from brrp_cli.seeds import child_seed
+from brrp_cli.seeds import child_rng
 
 Array = NDArray[np.float64]
 
@@ -95,9 +96,13 @@ def matched_starts(
     T_cam_center = similarity(translation=observed.center)
     behind = normalise(observed.center) * np.ptp(model.surface, axis=0).mean() / 4
     starts = [T_cam_center @ similarity(translation=behind)]
-    seeds = [child_seed(seed, "start", stored.name, number) for number in range(count)]
-    matches = match_repeatedly(stored.clouds[nearest], observed.cloud, matching, seeds)
-    starts += [T_cam_center @ found.T_target_source for found in matches if found is not None]
+    cloud = stored.clouds[nearest]
+    pairs = match_pairs(cloud, observed.cloud)
+    rng = child_rng(seed, "starts", stored.name)
+    found = drawn_motions(
+        cloud.points[pairs[:, 0]], observed.cloud.points[pairs[:, 1]], matching, count, rng
+    )
+    starts += [T_cam_center @ T_center_model for T_center_model in found]
     return starts
 
 
