@@ -44,7 +44,6 @@ with (
             "numpy.lib._format_impl",
             "csv",
             "tomllib",
-            "rosbags",
         ]
     )
 ):
