@@ -33,11 +33,16 @@ _PACKAGES = {"rerun": "rerun-sdk"}
 _NEEDS = {"pymeshlab": ("libGL.so.1", "libOpenGL.so.0")} if sys.platform == "linux" else {}
 
 
+_OPEN3D_EXTRAS = ("open3d.visualization", "open3d.ml")
+
+
 def import_library(name: str) -> ModuleType:
     """Import `name`; a missing package or system library becomes a DependencyError."""
     try:
         for library in _NEEDS.get(name, ()):
             ctypes.CDLL(library)
+        if name == "open3d" and name not in sys.modules:
+            return _open3d_without_extras()
         return importlib.import_module(name)
     except (ImportError, OSError) as error:
         found = str(error)
@@ -47,6 +52,27 @@ def import_library(name: str) -> ModuleType:
             f"pip install {package}, in the environment that runs brrp",
         )
         raise DependencyError(f"{name} does not load", found=found, fix=fix) from error
+
+
+def _open3d_without_extras() -> ModuleType:
+    """Open3D without its drawing and its data sets, which bring Plotly, Dash, pandas and
+    scikit-learn: more than half of the time of its import. Who asks for them gets them still."""
+    stubs = {name: ModuleType(name) for name in _OPEN3D_EXTRAS}
+    sys.modules.update(stubs)
+    try:
+        o3d = importlib.import_module("open3d")
+    finally:
+        for name, stub in stubs.items():
+            if sys.modules.get(name) is stub:
+                del sys.modules[name]
+
+    def later(name: str) -> Any:
+        if f"open3d.{name}" in _OPEN3D_EXTRAS:
+            return importlib.import_module(f"open3d.{name}")
+        raise AttributeError(f"module 'open3d' has no attribute {name!r}")
+
+    o3d.__getattr__ = later  # type: ignore[method-assign]
+    return o3d
 
 
 def import_open3d() -> Any:

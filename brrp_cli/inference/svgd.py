@@ -8,6 +8,9 @@ from collections.abc import Callable
 import torch
 from torch import Tensor
 
+# Adam's own (Kingma and Ba, 2015).
+BETAS, EPSILON = (0.9, 0.999), 1e-8
+
 
 def median_bandwidth(squared_distances: Tensor) -> Tensor:
     """h of k(x, y) = exp(-|x - y|^2 / h): median squared distance / ln(P + 1).
@@ -50,8 +53,13 @@ def run_svgd(
     score : (particles, step) -> grad ln p (P, D); it may draw a fresh mini-batch in each step.
     """
     moving = particles.clone()
-    optimizer = torch.optim.Adam([moving], lr=learning_rate, maximize=True)
+    mean, square = torch.zeros_like(moving), torch.zeros_like(moving)
+    # As torch.optim.Adam does it, which imports torch's compiler for its first step: two seconds.
     for step in range(steps):
-        moving.grad = stein_direction(moving, score(moving, step))
-        optimizer.step()
+        direction = stein_direction(moving, score(moving, step))
+        mean.lerp_(direction, 1 - BETAS[0])
+        square.mul_(BETAS[1]).addcmul_(direction, direction, value=1 - BETAS[1])
+        unbiased, spread = (1 - beta ** (step + 1) for beta in BETAS)
+        size = (square.sqrt() / math.sqrt(spread)).add_(EPSILON)
+        moving.addcdiv_(mean, size, value=learning_rate / unbiased)
     return moving

@@ -35,7 +35,7 @@ def resting_starts(model: Model, points: Array, plane: Plane, turns: int) -> lis
     """
     T_plane_cam = plane_frame(plane)
     T_cam_plane = np.linalg.inv(T_plane_cam)
-    seen = np.asarray(transform_points(T_plane_cam, points))[:, :2]
+    seen: Array = np.asarray(transform_points(T_plane_cam, points), dtype=np.float64)[:, :2]
     middle = np.quantile(seen, [STRAY, 1 - STRAY], axis=0).mean(axis=0)
     turned = [_turn(angle) for angle in np.arange(turns) * (2 * np.pi / turns)]
     starts = []
