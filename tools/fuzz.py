@@ -44,7 +44,6 @@ with (
             "numpy.lib._format_impl",
             "csv",
             "tomllib",
-            "rosbags",
         ]
     )
 ):
@@ -491,8 +490,9 @@ def main() -> None:
         return
     corpus = options.findings / "corpus"
     corpus.mkdir(exist_ok=True)
+    first = seeds()
     for number, reader in enumerate(READERS):
-        for i, data in enumerate(seeds()[reader.__name__]):
+        for i, data in enumerate(first[reader.__name__]):
             (corpus / f"{reader.__name__}-{i}").write_bytes(bytes([number]) + data)
     arguments = [
         sys.argv[0],

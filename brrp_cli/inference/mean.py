@@ -27,6 +27,9 @@ Array = NDArray[np.float64]
 # Signed distance (n,), metres, negative inside, of points (n, 3), metres, camera frame.
 Distance = Callable[[Array], Array]
 
+# Metres before the measured depth that still count as the seen surface.
+CRUST_BEFORE = 0.001
+
 
 @dataclass(frozen=True)
 class MeanLattice:
@@ -86,7 +89,12 @@ def shape_logits(distance: Array, evidence: float, config: MeanConfig) -> Array:
 def completed_logits(points: Array, part: SeenPart, config: MeanConfig) -> Array:
     """Logits (n,) at points (n, 3), metres, camera frame, of an object that is none of the stored
     ones."""
-    return np.clip(fitted().logits(lengths(points, part)), -config.limit, config.limit)
+    logits = np.clip(fitted().logits(lengths(points, part)), -config.limit, config.limit)
+    # What was seen has some thickness, however thin the walls are that the network thinks of.
+    behind = -depth_behind(points, part.frame)
+    own = at_pixels(points, part.frame.segmap, part.frame) == part.object_id
+    crust = own & (np.nan_to_num(behind, nan=np.inf) < config.crust) & (behind > -CRUST_BEFORE)
+    return np.where(crust, np.maximum(logits, config.crust_logit), logits)
 
 
 def empty_space(

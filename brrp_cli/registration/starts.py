@@ -42,7 +42,7 @@ def resting_starts(model: Model, points: Array, plane: Plane, turns: int) -> lis
     for T_plane_model in model.resting:
         T = np.stack(turned) @ T_plane_model
         placed, counted = _laid_over(T, model, middle, T_plane_cam[:3, 3])
-        directions = np.stack(turned)[:, :2, :2] @ _longest(T_plane_model, model)
+        directions = np.asarray(np.stack(turned)[:, :2, :2] @ _longest(T_plane_model, model))
         reach = np.einsum("bmi,bi->bm", placed[..., :2], directions)
         longest = np.where(counted, reach, -np.inf).max(axis=1)
         longest -= np.where(counted, reach, np.inf).min(axis=1)

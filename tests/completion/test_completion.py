@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from table_scene import TABLE, box, in_camera, photograph, placed
@@ -77,6 +79,20 @@ def test_a_cup_that_is_looked_into_stays_hollow():
     middle, wall = transform_points(T, np.array([[0, 0, 0.04], [0, -0.038, 0.03]]))
     probability = completed_logits(np.stack([middle, wall]), part_of(frame), MeanConfig())
     assert empty_space(middle[None], frame, 5, TABLE, MeanConfig())[0] or probability[0] < 0
+
+
+def test_what_is_seen_has_some_thickness_whatever_the_network_says():
+    frame = photographed(solids.beaker(0.04, 0.04, 0.06, 0.004), placed(0.0, 0.0, 0.0))
+    part = part_of(frame)
+    seen = frame.object_points(5).astype(np.float64)
+    ray = seen / np.linalg.norm(seen, axis=1, keepdims=True)
+    config, without = MeanConfig(), replace(MeanConfig(), crust=0.0)
+    behind, before = seen + 0.003 * ray, seen - 0.003 * ray
+    assert (completed_logits(behind, part, without) < 0).any()
+    assert (completed_logits(behind, part, config) >= config.crust_logit).all()
+    np.testing.assert_array_equal(
+        completed_logits(before, part, config), completed_logits(before, part, without)
+    )
 
 
 def test_a_part_has_the_extents_of_what_is_seen():
