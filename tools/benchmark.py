@@ -133,7 +133,8 @@ def measure(
     wholes = {
         "1 thread": spread([each.wall for each in runs]),
         f"{options.workers} threads": spread([each.wall for each in threaded]),
-        "CPU": spread([each.cpu for each in threaded]),
+        "CPU, 1 thread": spread([each.cpu for each in runs]),
+        f"CPU, {options.workers}": spread([each.cpu for each in threaded]),
     }
     samples = observe(frame, config.observation, 0).objects
     mean = sum(len(o.samples) for o in samples.values()) // max(len(samples), 1)
@@ -142,7 +143,7 @@ def measure(
 
     click.echo(f"  {'':14}{'median':>9}{'least':>9}{'most':>9}{'plain':>9}{'ratio':>8}{'limit':>9}")
     for stage, found in {**stages, **wholes}.items():
-        reference = plain_cpu if stage == "CPU" else plain.get(stage, plain.get("whole"))
+        reference = plain_cpu if stage.startswith("CPU") else plain.get(stage, plain.get("whole"))
         limit = least[stage].seconds * count if stage in least else None
         click.echo(
             f"  {stage:14}{found.median:9.3f}{found.least:9.3f}{found.most:9.3f}"

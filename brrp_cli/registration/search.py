@@ -126,7 +126,7 @@ def _slid(
 ) -> Array:
     """Each placement (B, 4, 4), of one scale, with so many observed points brought onto its
     surface; those further from it than `distance` metres do not pull."""
-    T_model_cam: Array = np.linalg.inv(T_cam_model)
+    T_model_cam = np.asarray(np.linalg.inv(T_cam_model), dtype=np.float64)
     slid = descend(T_model_cam, testimony.points[:points], model, distance / scale)
     return np.asarray(np.linalg.inv(slid))
 

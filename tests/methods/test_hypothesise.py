@@ -60,7 +60,7 @@ def truth():
 
 @pytest.fixture(scope="module")
 def result(folder, truth):
-    return reconstruct(photograph(truth), open_prior(folder))
+    return reconstruct(photograph(truth), open_prior(folder), workers=2)
 
 
 @pytest.mark.parametrize("object_id", [BOX, CAN])
@@ -103,7 +103,7 @@ def test_surface_uncertainty_is_in_metres_and_larger_where_nobody_looked(result,
 
 
 def test_the_same_seed_gives_the_same_bytes(result, folder, truth):
-    again = reconstruct(photograph(truth), open_prior(folder))
+    again = reconstruct(photograph(truth), open_prior(folder), workers=2)
     for a, b in zip(result.objects, again.objects, strict=True):
         assert a.surface.vertices.tobytes() == b.surface.vertices.tobytes()
         assert a.surface.uncertainty.tobytes() == b.surface.uncertainty.tobytes()
@@ -169,3 +169,10 @@ def test_a_prior_without_distances_serves_the_paper(folder, truth, tmp_path):
     )
     assert found.objects[0].status in (OK, NO_SURFACE)
     assert found.objects[0].retrieved[0].name == "can"
+
+
+def test_the_number_of_threads_changes_no_byte(folder, truth, result):
+    again = reconstruct(photograph(truth), open_prior(folder), workers=1)
+    for one, other in zip(result.objects, again.objects, strict=True):
+        assert one.surface.vertices.tobytes() == other.surface.vertices.tobytes()
+        assert one.surface.uncertainty.tobytes() == other.surface.uncertainty.tobytes()

@@ -62,21 +62,33 @@ class Cold:
     megabytes: float
 
 
+_WATCH = """
+import resource, subprocess, sys
+code = subprocess.call(sys.argv[1:], stdout=subprocess.DEVNULL)
+used = resource.getrusage(resource.RUSAGE_CHILDREN)
+print(used.ru_utime + used.ru_stime, used.ru_maxrss)
+sys.exit(code)
+"""
+
+
 def cold_reconstruct(frame: Path, prior: Path, output: Path) -> Cold:
     """`brrp reconstruct FRAME` as a process of its own."""
     command = [sys.executable, "-m", "brrp_cli", "-q", "reconstruct", str(frame)]
     command += ["--prior", str(prior), "-o", str(output), "--overwrite"]
     environment = os.environ | {"PYTHONPATH": str(Path(__file__).resolve().parents[2])}
     start = time.perf_counter()
-    with subprocess.Popen(command, env=environment, stdout=subprocess.DEVNULL) as process:
-        # Of this child alone; RUSAGE_CHILDREN holds the greatest of all that there were.
-        _, status, usage = os.wait4(process.pid, 0)
-        process.returncode = os.waitstatus_to_exitcode(status)
-    if process.returncode:
-        raise SystemExit(f"brrp reconstruct ended with {process.returncode}")
-    return Cold(
-        usage.ru_utime + usage.ru_stime, time.perf_counter() - start, usage.ru_maxrss * 1024 / 1e6
+    # Through a small process: a child's greatest memory begins with that of who started it.
+    told = subprocess.run(
+        [sys.executable, "-c", _WATCH, *command],
+        env=environment,
+        stdout=subprocess.PIPE,
+        text=True,
+        check=False,
     )
+    if told.returncode:
+        raise SystemExit(f"brrp reconstruct ended with {told.returncode}")
+    cpu, kilobytes = (float(word) for word in told.stdout.split())
+    return Cold(cpu, time.perf_counter() - start, kilobytes * 1024 / 1e6)
 
 
 def peak_megabytes() -> float:
