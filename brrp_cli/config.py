@@ -125,7 +125,7 @@ class SearchConfig:
     coarse: int = 96
     coarse_distance: float = 0.03
     coarse_points: int = 400
-    fine: int = 16
+    fine: int = 8
     fine_distance: float = 0.01
     fine_points: int = 1000
     seen_points: int = 150
