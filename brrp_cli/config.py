@@ -114,6 +114,8 @@ class SearchConfig:
     Starts are `matchings` feature matchings and every resting pose turned `turns` times. The best
     `coarse` of them are refined and judged, the best `fine` of those again. The best `rescaled`
     are then tried at `scales` times the true size; evidence falls by scale_cost * ln(scale)^2.
+    No other size is tried where evidence reaches `settled`, and nothing is refined further where
+    none of the coarse placements reaches `hopeless`.
     Of placements whose surfaces lie within `distinct` metres the best is kept, `kept` in all.
     """
 
@@ -125,7 +127,7 @@ class SearchConfig:
     coarse: int = 96
     coarse_distance: float = 0.03
     coarse_points: int = 400
-    fine: int = 8
+    fine: int = 16
     fine_distance: float = 0.01
     fine_points: int = 1000
     seen_points: int = 150
@@ -133,6 +135,8 @@ class SearchConfig:
     rescaled: int = 2
     scale_distance: float = 0.015
     scale_cost: float = 0.6
+    hopeless: float = 0.1
+    settled: float = 0.9
     distinct: float = 0.0015
     kept: int = 6
     evidence: EvidenceConfig = field(default_factory=EvidenceConfig)

@@ -55,13 +55,15 @@ def search(
     starts = matched_starts(model, observed, features, config.matching, config.matchings, seed)
     if testimony.plane is not None:
         starts += resting_starts(model, testimony.points, testimony.plane, config.turns)
-    T = _best(np.stack(starts), model, testimony, config, config.coarse)
+    T, _ = _best(np.stack(starts), model, testimony, config, config.coarse)
     T = _slid(T, 1.0, model, testimony, config.coarse_distance, config.coarse_points)
-    T = _best(T, model, testimony, config, config.fine)
+    T, best = _best(T, model, testimony, config, config.fine)
+    if best < config.hopeless:
+        return _distinct(_judged(T, 1.0, model, testimony, config), config)
     T = _refined(T, 1.0, model, testimony, config.fine_distance, config.fine_points)
     found = _judged(T, 1.0, model, testimony, config)
     parents = [each.T_cam_model for each in found[: config.rescaled]]
-    for scale in config.scales:
+    for scale in config.scales if found[0].evidence < config.settled else ():
         resized = np.stack([_resize(parent, scale, testimony) for parent in parents])
         resized = _refined(
             resized, scale, model, testimony, config.scale_distance, config.coarse_points
@@ -90,7 +92,8 @@ def _distinct(found: list[Hypothesis], config: SearchConfig) -> list[Hypothesis]
 
 def _best(
     T_cam_model: Array, model: Model, testimony: Testimony, config: SearchConfig, count: int
-) -> Array:
+) -> tuple[Array, float]:
+    """The `count` best placements by a first look at their evidence, and the best of that."""
     score = testimony.score(
         T_cam_model,
         model,
@@ -98,7 +101,8 @@ def _best(
         model_points=COARSE,
         seen_points=config.seen_points,
     )
-    return np.asarray(T_cam_model[np.argsort(-score, kind="stable")[:count]])
+    order = np.argsort(-score, kind="stable")[:count]
+    return np.asarray(T_cam_model[order]), float(score[order[0]])
 
 
 def _judged(

@@ -19,7 +19,7 @@ ID = 5
 CONFIG = SearchConfig()
 
 
-def find(name, T_cam_mesh, *, size=1.0, plane=TABLE, seed=0):
+def find(name, T_cam_mesh, *, size=1.0, plane=TABLE, seed=0, config=CONFIG):
     """Hypotheses about an object of that many times the stored size, seen from the front."""
     mesh = MESHES[name]()
     mesh.apply_scale(size)
@@ -30,7 +30,7 @@ def find(name, T_cam_mesh, *, size=1.0, plane=TABLE, seed=0):
         observed_cloud(points, PARAMETERS.features),
         testimony.Testimony(points, frame, plane),
         PARAMETERS.features,
-        CONFIG,
+        config,
         seed,
     )
 
@@ -71,6 +71,23 @@ def test_an_object_of_another_size_is_found_at_that_scale(size):
     assert best.scale == size
     assert np.cbrt(np.linalg.det(best.T_cam_model[:3, :3])) == pytest.approx(size)
     assert errors(best, truth, size).max() < 0.003
+
+
+def test_no_other_size_is_tried_of_what_lies_well_enough():
+    """An object of 0.8 of its size, when any evidence is held for enough, and when none is."""
+    truth = placed(0.0, 0.03, 1.2)
+    settled, tried = (
+        find("ell", truth, size=0.8, config=replace(CONFIG, settled=enough))
+        for enough in (-np.inf, np.inf)
+    )
+    assert {each.scale for each in settled} == {1.0}
+    assert tried[0].scale == 0.8 and tried[0].evidence > settled[0].evidence
+
+
+def test_what_is_hopeless_is_judged_as_it_lies():
+    truth = placed(0.0, 0.03, 1.2)
+    left = find("ell", truth, size=0.8, config=replace(CONFIG, hopeless=np.inf, settled=np.inf))
+    assert left and {each.scale for each in left} == {1.0}
 
 
 def test_without_a_plane_feature_matchings_are_enough():
