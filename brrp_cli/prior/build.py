@@ -198,17 +198,20 @@ class _Run:
             return
         file = shard_file(self.parameters, here)
         if any(name in self.waiting or self.stock[name, sha].shard != file for name, sha in here):
-            objects = [self._take_out(name, sha) for name, sha in here]
+            objects = [self._stored(name, sha) for name, sha in here]
             write_shard(self.out / file, objects, self.parameters)
             records = [stored.record for stored in objects]
+            # Not before: Ctrl-C in the middle of writing must lose none of them.
+            for name, _ in here:
+                self.waiting.pop(name, None)
         else:
             records = [self.stock[key].record for key in here]
         for (name, _), record in zip(here, records, strict=True):
             self.done[name] = Finished(file, record)
 
-    def _take_out(self, name: str, sha256: str) -> StoredObject:
+    def _stored(self, name: str, sha256: str) -> StoredObject:
         if name in self.waiting:
-            return self.waiting.pop(name)
+            return self.waiting[name]
         with open_shard(self.out / self.stock[name, sha256].shard) as shard:
             return read_stored(shard, name)
 

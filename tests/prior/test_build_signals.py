@@ -22,6 +22,7 @@ from brrp_cli.prior.build import build_prior
 from brrp_cli.prior.plan import plan_shards
 from brrp_cli.prior.shard import object_names, open_shard
 from brrp_cli.prior.store import open_prior, verify_prior
+from brrp_cli.stop import StoppedError
 
 # Runs the command's own entry with parameters that take a second, not a minute.
 SCRIPT = """
@@ -137,12 +138,37 @@ def test_a_signal_ends_the_build_with_its_code_and_keeps_what_is_finished(
     assert prior_bytes(out) == wanted
 
 
+def test_ctrl_c_while_a_shard_is_written_loses_none_of_its_objects(
+    boxes: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from test_build_faults import TINY
+
+    write, calls = build.write_shard, []
+
+    def interrupted(*given: object) -> None:
+        calls.append(given)
+        if len(calls) == 1:
+            raise KeyboardInterrupt
+        write(*given)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(build, "write_shard", interrupted)
+    with pytest.raises(StoppedError) as stop:
+        build_prior(boxes, tmp_path / "prior", TINY, workers=1)
+    made = re.search(r"([1-4]) of 4 objects made in this run; they are kept", str(stop.value))
+    assert made, stop.value
+    kept = (tmp_path / "prior").glob("shards/*")
+    assert sum(count_objects(path) for path in kept) == int(made[1])
+
+
 def test_a_build_killed_at_random_times_again_and_again_ends_with_the_same_bytes(
     script: Path, boxes: Path, wanted: dict[str, bytes], tmp_path: Path
 ) -> None:
+    """Until 20 were hit: some builds end before the signal comes, most on a busy machine."""
     rng = random.Random(0)
-    kills = 0
-    for attempt in range(6):
+    kills = attempt = 0
+    while kills < 20:
+        attempt += 1
+        assert attempt <= 20, f"{kills} of {5 * attempt} builds were hit"
         out = tmp_path / f"prior{attempt}"
         start_time = time.monotonic()
         finished(script, boxes, out)
@@ -159,7 +185,6 @@ def test_a_build_killed_at_random_times_again_and_again_ends_with_the_same_bytes
                 process.communicate()
         finished(script, boxes, out)
         assert prior_bytes(out) == wanted
-    assert kills >= 15
 
 
 @pytest.mark.parametrize("count", [2, 8])
