@@ -94,12 +94,11 @@ class Prior:
         """One object, not to be changed. Errors: KeyError for an unknown name, PriorError for a bad
         shard."""
         with self._reading:
-            if name not in self._held:
-                self._held[name] = self._read(name)
-            self._held.move_to_end(name)
+            found = self._held.pop(name, None) or self._read(name)
+            self._held[name] = found
             if len(self._held) > HELD:
                 self._held.popitem(last=False)
-            return self._held[name]
+            return found
 
     def _read(self, name: str) -> PriorObject:
         row = self.index.rows[name]

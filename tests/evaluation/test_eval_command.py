@@ -247,7 +247,7 @@ def test_what_an_older_prior_lacks_is_told_once_before_the_work(
 
 def started(place, output):
     """The command in a process of its own, as people run it."""
-    words = ["-q", "eval", place / "scenes", "--method", "vprism", "--shift-masks", "0,1,2"]
+    words = ["-q", "eval", place / "scenes", "--method", "vprism", "--shift-masks", "0,1,2,3,4,5"]
     return subprocess.Popen(
         [sys.executable, "-m", "brrp_cli", *map(str, words), "-o", str(output), "--workers", "2"],
         cwd=Path(brrp_cli.__file__).parents[1],
