@@ -222,7 +222,7 @@ def _pointsdf(
 
     own = PointSDFConfig()
     loaded = load_weights(weights)
-    surface = replace(config.surface, level=own.level)
+    surface = replace(config.surface, level=METHODS["pointsdf"].level(config))
     asked = replace(config, surface=surface)
     objects = [
         _whole(item.object_id, partial(_itself, item), asked)

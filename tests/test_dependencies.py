@@ -2,7 +2,7 @@ from pathlib import Path
 
 import pytest
 
-from brrp_cli.dependencies import import_library
+from brrp_cli.dependencies import import_library, import_open3d
 from brrp_cli.errors import DependencyError
 
 
@@ -41,3 +41,10 @@ def test_a_missing_system_library_names_its_package(
     assert "apt-get install" in str(caught.value.fix)
     assert package in str(caught.value.fix)
     assert library in str(caught.value.found)
+
+
+def test_what_open3d_is_imported_without_is_there_for_who_asks() -> None:
+    o3d = import_open3d()
+    assert callable(o3d.visualization.draw_geometries)
+    with pytest.raises(AttributeError, match="no attribute 'nothing'"):
+        _ = o3d.nothing

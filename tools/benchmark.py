@@ -15,7 +15,6 @@ of one thread; the whole is timed with one thread and with `--workers`. The plai
 from __future__ import annotations
 
 import json
-import os
 import sys
 import tempfile
 import time
@@ -43,6 +42,7 @@ from brrp_cli.frames.observe import observe
 from brrp_cli.frames.readers import read_frame
 from brrp_cli.prior.store import Prior, open_prior
 from brrp_cli.retrieval.choose import choose_retriever
+from brrp_cli.threads import cores
 from brrp_cli.version import __version__
 from brrp_cli.warm import Reconstructor
 
@@ -85,7 +85,7 @@ def main(
     """Time the made frame and FRAME_PATHS."""
     if quick:
         repeats, plain_objects = 1, 1 if plain_objects is None else plain_objects
-    options = Options(repeats, workers or len(os.sched_getaffinity(0)), plain_objects, cold)
+    options = Options(repeats, workers or cores(), plain_objects, cold)
     try:
         frames = {MADE: four_objects()} if made else {}
         frames |= {str(path): read_frame(path) for path in frame_paths}

@@ -37,6 +37,7 @@ from brrp_cli.progress import progress
 from brrp_cli.retrieval.choose import USE_APPEARANCE, USE_CLIP, resolve_name
 from brrp_cli.retrieval.clip_files import clip_folder, need_clip_folder
 from brrp_cli.stop import stopped
+from brrp_cli.threads import cores
 from brrp_cli.version import __version__
 
 
@@ -97,7 +98,7 @@ def evaluate(request: Request, say: Callable[[str], None] = lambda text: None) -
     if any(variant.retriever in USE_CLIP for variant in variants):
         _prepare_clip(opened, need_clip_folder(request.clip_dir))
     parameters = _parameters(request, scenes, variants, prior)
-    workers = request.workers or len(os.sched_getaffinity(0))
+    workers = request.workers or cores()
     labels = short_labels(variants)
     plan = Plan(
         scenes=scenes,

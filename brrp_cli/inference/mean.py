@@ -7,7 +7,6 @@ thin wall needs no hinge points of its own. Each m is kept on a lattice in the c
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -24,8 +23,6 @@ from brrp_cli.frames.plane import Plane
 from brrp_cli.methods.base import Axes
 
 Array = NDArray[np.float64]
-# Signed distance (n,), metres, negative inside, of points (n, 3), metres, camera frame.
-Distance = Callable[[Array], Array]
 
 # Metres before the measured depth that still count as the seen surface.
 CRUST_BEFORE = 0.001

@@ -34,8 +34,9 @@ from brrp_cli.prior.plan import plan_shards, shard_file
 from brrp_cli.prior.shard import StoredObject, open_shard, read_stored, write_shard
 from brrp_cli.prior.sidecar import is_whole, sidecar_file, write_sidecar
 from brrp_cli.prior.stock import Finished, Stock, take_stock
-from brrp_cli.prior.workers import cpu_count, run_tasks
+from brrp_cli.prior.workers import run_tasks
 from brrp_cli.stop import sigterm_raises, stopped
+from brrp_cli.threads import cores
 
 # No mesh that ever gets done takes this long; pymeshlab can loop for ever on some.
 TIME_LIMIT = 900.0
@@ -82,7 +83,7 @@ def build_prior(
             refuse_differences(before.parameters, table, out)
         run = _Run(out, table, sources, take_stock(out, before, table))
         run.hash_inputs()
-        run.make(parameters or BuildParameters(), workers or cpu_count(), time_limit, progress)
+        run.make(parameters or BuildParameters(), workers or cores(), time_limit, progress)
         manifest = run.with_sidecar(run.manifest(phrases), before)
         if not manifest.objects:
             raise MeshError(

@@ -42,11 +42,6 @@ class _Worker:
         self.pipe.close()
 
 
-def cpu_count() -> int:
-    """Processors that this process may use."""
-    return len(os.sched_getaffinity(0))
-
-
 def run_tasks(
     function: Callable[..., Any], tasks: Sequence[tuple[Any, ...]], workers: int, time_limit: float
 ) -> Generator[tuple[int, Any], None, None]:

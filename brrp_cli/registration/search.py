@@ -56,7 +56,7 @@ def search(
     if testimony.plane is not None:
         starts += resting_starts(model, testimony.points, testimony.plane, config.turns)
     T, _ = _best(np.stack(starts), model, testimony, config, config.coarse)
-    T = _slid(T, 1.0, model, testimony, config.coarse_distance, config.coarse_points)
+    T = _slid(T, model, testimony, config)
     T, best = _best(T, model, testimony, config, config.fine)
     if best < config.hopeless:
         return _distinct(_judged(T, 1.0, model, testimony, config), config)
@@ -120,19 +120,12 @@ def _judged(
     return sorted(found, key=lambda each: -each.evidence)
 
 
-def _slid(
-    T_cam_model: Array,
-    scale: float,
-    model: Model,
-    testimony: Testimony,
-    distance: float,
-    points: int,
-) -> Array:
-    """Each placement (B, 4, 4), of one scale, with so many observed points brought onto its
-    surface; those further from it than `distance` metres do not pull."""
+def _slid(T_cam_model: Array, model: Model, testimony: Testimony, config: SearchConfig) -> Array:
+    """Each placement (B, 4, 4), at the model's own size, with the coarse observed points brought
+    onto its surface."""
     T_model_cam = np.asarray(np.linalg.inv(T_cam_model), dtype=np.float64)
-    slid = descend(T_model_cam, testimony.points[:points], model, distance / scale)
-    return np.asarray(np.linalg.inv(slid))
+    seen = testimony.points[: config.coarse_points]
+    return np.asarray(np.linalg.inv(descend(T_model_cam, seen, model, config.coarse_distance)))
 
 
 def _refined(

@@ -1,6 +1,7 @@
 import csv
 import json
 import math
+import os
 import shutil
 import signal
 import subprocess
@@ -254,6 +255,7 @@ def started(place, output):
         stdout=subprocess.DEVNULL,
         stderr=subprocess.PIPE,
         text=True,
+        start_new_session=True,
         # A shell lets its background processes, and theirs, ignore Ctrl-C.
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
     )
@@ -271,9 +273,21 @@ def after_rows(process, output, count):
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("sent", [signal.SIGKILL, signal.SIGINT, signal.SIGTERM])
-def test_a_run_that_is_stopped_again_and_again_ends_with_the_same_table(place, tmp_path, sent):
-    """After each new row; workers of a killed run may still be at work beside the next."""
+@pytest.mark.parametrize(
+    ("sent", "send", "least"),
+    [
+        (signal.SIGKILL, os.killpg, 3),
+        # Its workers end the scenes that they hold, which may be all, beside the next run.
+        (signal.SIGKILL, os.kill, 1),
+        (signal.SIGINT, os.kill, 3),
+        (signal.SIGTERM, os.kill, 3),
+    ],
+    ids=["kill", "kill alone", "ctrl-c", "terminate"],
+)
+def test_a_run_that_is_stopped_again_and_again_ends_with_the_same_table(
+    place, tmp_path, sent, send, least
+):
+    """After each new row."""
     with started(place, tmp_path / "whole") as process:
         assert process.wait() == 3, process.stderr.read()
     output = tmp_path / "stopped"
@@ -282,7 +296,8 @@ def test_a_run_that_is_stopped_again_and_again_ends_with_the_same_table(place, t
         done = rows_written(output)
         with started(place, output) as process:
             after_rows(process, output, done + 1)
-            process.send_signal(sent)
+            if process.poll() is None:
+                send(process.pid, sent)
             told = process.stderr.read()
         if process.returncode == 3:
             break
@@ -291,8 +306,7 @@ def test_a_run_that_is_stopped_again_and_again_ends_with_the_same_table(place, t
         assert "Traceback" not in told
         if sent != signal.SIGKILL:
             assert "give the same command again to go on" in told
-    # Workers of a run that was killed go on by themselves, up to the last row if they can.
-    assert stops >= (1 if sent == signal.SIGKILL else 3)
+    assert stops >= least
     assert without_cost(rows_of(output)) == without_cost(rows_of(tmp_path / "whole"))
 
 

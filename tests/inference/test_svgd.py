@@ -30,6 +30,22 @@ def test_recovers_a_gaussian_posterior_known_in_closed_form():
     np.testing.assert_allclose(torch.cov(particles.T), covariance, atol=0.12 * covariance.max())
 
 
+def test_the_steps_are_those_of_torchs_adam():
+    """Of one particle, on which no other acts: Adam on its score, which falls off unevenly."""
+    start = torch.tensor([[0.5, -1.0, 3.0]], dtype=torch.float64)
+
+    def score(particles, step):
+        return torch.sin(3 * particles) - (1 + step) * particles
+
+    expected = start.clone()
+    optimizer = torch.optim.Adam([expected], lr=0.1, maximize=True)
+    for step in range(25):
+        expected.grad = stein_direction(expected, score(expected, step))
+        optimizer.step()
+    found = run_svgd(start, score, steps=25, learning_rate=0.1)
+    torch.testing.assert_close(found, expected, rtol=1e-12, atol=1e-12)
+
+
 def test_the_direction_is_the_papers_sum_over_particles():
     particles = torch.tensor([[0.0, 0.0], [1.0, 0.5], [-0.3, 2.0]], dtype=torch.float64)
     scores = torch.tensor([[1.0, 2.0], [0.5, -1.0], [0.0, 0.3]], dtype=torch.float64)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import platform
 import time
 from collections.abc import Callable
@@ -13,6 +12,7 @@ import numpy as np
 import torch
 
 from brrp_cli.config import Config
+from brrp_cli.threads import cores
 
 TRIES = 5
 # Operations of one descent to the nearest of 2,000 points in a k-d tree, and bytes of the nodes on
@@ -52,7 +52,7 @@ def measure_machine() -> Machine:
         bandwidth = 2 * source.nbytes / _best(lambda: np.copyto(target, source))
     finally:
         torch.set_num_threads(threads)
-    return Machine(_processor(), len(os.sched_getaffinity(0)), flops, bandwidth)
+    return Machine(_processor(), cores(), flops, bandwidth)
 
 
 def limits(machine: Machine, config: Config, samples: int) -> dict[str, Limit]:
