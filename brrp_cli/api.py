@@ -125,7 +125,8 @@ def reconstruct(
     )
     seconds["retriever"] = time.perf_counter() - start
     start = time.perf_counter()
-    scene = observe(frame, config.observation, seed)
+    workers = workers or cores()
+    scene = observe(frame, config.observation, seed, workers)
     seconds["observation"] = time.perf_counter() - start
 
     def one(observation: ObjectObservation) -> ObjectReconstruction:
@@ -143,7 +144,7 @@ def reconstruct(
         return _whole(object_id, partial(one, scene.objects[object_id]), config)
 
     ids = frame.object_ids
-    done = in_threads(whole, ids, workers or cores())
+    done = in_threads(whole, ids, workers)
     return Reconstruction(
         frame=frame,
         objects=list(progress(done, "objects", len(ids))),

@@ -126,16 +126,22 @@ class SearchConfig:
     )
     coarse: int = 96
     coarse_distance: float = 0.03
-    coarse_points: int = 400
+    coarse_points: int = 150
+    coarse_steps: int = 6
+    middle: int = 32
+    middle_points: int = 400
+    middle_steps: int = 8
     fine: int = 16
     fine_distance: float = 0.01
     fine_points: int = 1000
+    fine_steps: int = 10
     seen_points: int = 150
     scales: tuple[float, ...] = (0.8, 0.9, 1.1, 1.25)
     rescaled: int = 2
     scale_distance: float = 0.015
     scale_cost: float = 0.6
     hopeless: float = 0.1
+    beaten: float = 0.3
     settled: float = 0.9
     distinct: float = 0.0015
     kept: int = 6
@@ -211,7 +217,7 @@ class FittedMapConfig:
     particles: int = 8
     steps: int = 40
     learning_rate: float = 0.1
-    batch: int = 1024
+    batch: int = 512
     start: float = 0.3
     behind: float = 0.004
     lambda_observed: float = 50.0

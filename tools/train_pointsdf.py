@@ -54,6 +54,13 @@ from brrp_cli.pointsdf.examples import TRUTHS, Recipe, make_examples, read_examp
 )
 @click.option("--truth", default="closed", show_default=True, type=click.Choice(TRUTHS))
 @click.option("--epochs", default=50, show_default=True, type=click.IntRange(1))
+@click.option(
+    "--cooling",
+    default=0,
+    show_default=True,
+    type=click.IntRange(0),
+    help="Last epochs, over which the rate falls to nothing.",
+)
 @click.option("--batch", default=16, show_default=True, type=click.IntRange(2), help="Objects.")
 @click.option("--queries", default=512, show_default=True, type=click.IntRange(1))
 @click.option("--noise", default=0.002, show_default=True, type=click.FloatRange(0), help="Metres.")
@@ -77,6 +84,7 @@ def main(
     data_root: Path | None,
     truth: str,
     epochs: int,
+    cooling: int,
     batch: int,
     queries: int,
     noise: float,
@@ -97,6 +105,8 @@ def main(
 
     began = monotonic()
     try:
+        if cooling > epochs:
+            raise BrrpError("--cooling is a part of --epochs", found=f"{cooling} of {epochs}")
         network = NetworkConfig().narrowed(width)
         recipe = Recipe(truth, network.points, scale=network.scale)
         folder = output / "examples"
@@ -130,7 +140,7 @@ def main(
             "truth": truth,
             "meshes": sorted(Counter(train.names)),
         }
-        config = TrainingConfig(epochs, batch, queries, noise, rate, precision, seed)
+        config = TrainingConfig(epochs, batch, queries, noise, rate, precision, seed, cooling)
         weights = output / f"{output.name}.safetensors"
         training = Training(network, config, output, weights, about, pick_device(device))
         done = training.progress

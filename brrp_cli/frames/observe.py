@@ -17,6 +17,7 @@ from brrp_cli.frames.frame import BACKGROUND, Frame
 from brrp_cli.frames.plane import Plane, fit_plane
 from brrp_cli.frames.subsample import grid_subsample
 from brrp_cli.seeds import child_rng
+from brrp_cli.threads import in_threads
 
 log = logging.getLogger(__name__)
 
@@ -49,8 +50,11 @@ class SceneObservation:
     too_few: dict[int, int] = field(default_factory=dict)
 
 
-def observe(frame: Frame, config: ObservationConfig, seed: int) -> SceneObservation:
-    """Sample the frame around each of its objects. The same seed gives the same bytes."""
+def observe(
+    frame: Frame, config: ObservationConfig, seed: int, workers: int = 1
+) -> SceneObservation:
+    """Sample the frame around each of its objects. The same seed gives the same bytes, whatever the
+    number of `workers`, objects at a time."""
     points = {i: frame.object_points(i) for i in frame.object_ids}
     too_few = {i: len(p) for i, p in points.items() if len(p) < config.min_points}
     centers = {i: box_center(p) for i, p in points.items() if i not in too_few}
@@ -64,25 +68,31 @@ def observe(frame: Frame, config: ObservationConfig, seed: int) -> SceneObservat
 
     rays = ray_samples(frame.points[frame.valid], np.array(list(centers.values())), config, seed)
     surfaces = {i: grid_subsample(p, config.surface_cell) for i, p in points.items()}
-    objects = {}
-    for object_id, center in centers.items():
-        others = [s for i, s in surfaces.items() if i != object_id]
+
+    def sample(object_id: int) -> ObjectObservation:
+        center = centers[object_id]
         free = [_within(rays, center, config.ray_radius)]
         if plane is not None:
             free.append(below_samples(center, plane, config, seed, object_id))
         free = [
             grid_subsample(np.concatenate(free), config.free_cell),
-            *(_within(other, center, config.ray_radius) for other in others),
+            *(
+                _within(other, center, config.ray_radius)
+                for i, other in surfaces.items()
+                if i != object_id
+            ),
         ]
         occupied = surfaces[object_id]
         samples = np.concatenate([occupied, *free])
-        objects[object_id] = ObjectObservation(
+        return ObjectObservation(
             object_id=object_id,
             points=points[object_id],
             center=center,
             samples=samples,
             labels=np.arange(len(samples)) < len(occupied),
         )
+
+    objects = dict(zip(centers, in_threads(sample, list(centers), workers), strict=True))
     return SceneObservation(plane=plane, objects=objects, too_few=too_few)
 
 

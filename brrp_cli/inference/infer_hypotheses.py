@@ -33,13 +33,13 @@ Array = NDArray[np.float64]
 class Problem:
     """What is to be inferred.
 
-    observed : samples near the object; mean : C prior means; weights : (C,) of the hypotheses, sum
-    1; box : (2, 3), metres, camera frame, what was seen and the hypotheses' shapes
+    observed : samples near the object; mean : C prior means; which : (P,) the one of each particle;
+    box : (2, 3), metres, camera frame, what was seen and the hypotheses' shapes
     """
 
     observed: LabelledPoints
     mean: MeanLattice
-    weights: Array
+    which: NDArray[np.int64]
     box: Array
 
 
@@ -49,7 +49,7 @@ def infer_correction(
     """Particles over the weights. The same seed gives the same particles."""
     center = problem.box.mean(axis=0)
     grid = box_grid(problem.box - center, config)
-    which = share_out(problem.weights, config.particles)
+    which = problem.which
     samples = _inside(_behind(problem.observed, config.behind), problem.box, grid.spacing)
     points = torch.from_numpy((samples.points - center).astype(np.float32)).to(device)
     phi = factors(points, grid)
@@ -66,7 +66,7 @@ def infer_correction(
             weights, phi.rows(rows), labels[rows], mean[:, rows]
         )
 
-    start = config.start * torch.randn(config.particles, grid.dimension, generator=generator)
+    start = config.start * torch.randn(len(which), grid.dimension, generator=generator)
     start[:, 0] = 0
     weights = run_svgd(
         start.to(device), score, steps=config.steps, learning_rate=config.learning_rate

@@ -23,6 +23,7 @@ from brrp_cli.frames.plane import Plane
 from brrp_cli.methods.base import Axes
 
 Array = NDArray[np.float64]
+Floats = NDArray[np.float32]
 
 # Metres before the measured depth that still count as the seen surface.
 CRUST_BEFORE = 0.001
@@ -86,12 +87,49 @@ def shape_logits(distance: Array, evidence: float, config: MeanConfig) -> Array:
 def completed_logits(points: Array, part: SeenPart, config: MeanConfig) -> Array:
     """Logits (n,) at points (n, 3), metres, camera frame, of an object that is none of the stored
     ones."""
-    logits = np.clip(fitted().logits(lengths(points, part)), -config.limit, config.limit)
-    # What was seen has some thickness, however thin the walls are that the network thinks of.
+    return _with_crust(fitted().logits(lengths(points, part)), points, part, config)
+
+
+def completed_lattice(
+    nodes: Array, empty: NDArray[np.bool_], part: SeenPart, config: MeanConfig
+) -> NDArray[np.float16]:
+    """`completed_logits` (nx, ny, nz) at nodes (nx, ny, nz, 3), but where it is empty.
+
+    The network is asked at every second node along each axis; between them its logits are linear.
+    """
+    near = binary_dilation(~empty, np.ones((3, 3, 3), bool))
+    # One node more at the end where the last one would have none after it.
+    odd = np.pad(near, [(0, 1 - n % 2) for n in near.shape])[::2, ::2, ::2]
+    steps = [np.arange(n) * 2 for n in odd.shape]
+    at = nodes[0, 0, 0] + (nodes[1, 1, 1] - nodes[0, 0, 0]) * np.stack(
+        np.meshgrid(*steps, indexing="ij"), axis=-1
+    )
+    asked = np.full(odd.shape, -config.limit, np.float32)
+    asked[odd] = fitted().logits(lengths(at[odd], part))
+    for axis, count in enumerate(empty.shape):
+        asked = _doubled(asked, axis, count)
+    logits = np.full(empty.shape, -config.limit, np.float16)
+    logits[~empty] = _with_crust(asked[~empty], nodes[~empty], part, config)
+    return logits
+
+
+def _doubled(values: Floats, axis: int, count: int) -> Floats:
+    """The first `count` of values along an axis with the mean of each two between them."""
+    first = np.moveaxis(values, axis, 0)
+    found = np.empty((2 * len(first) - 1, *first.shape[1:]), values.dtype)
+    found[::2] = first
+    found[1::2] = (first[:-1] + first[1:]) / 2
+    return np.moveaxis(found[:count], 0, axis)
+
+
+def _with_crust(logits: Floats, points: Array, part: SeenPart, config: MeanConfig) -> Array:
+    """The network's logits (n,) at points (n, 3), limited. What was seen has some thickness,
+    however thin the walls are that the network thinks of."""
+    limited = np.clip(logits, -config.limit, config.limit)
     behind = -depth_behind(points, part.frame)
     own = at_pixels(points, part.frame.segmap, part.frame) == part.object_id
     crust = own & (np.nan_to_num(behind, nan=np.inf) < config.crust) & (behind > -CRUST_BEFORE)
-    return np.where(crust, np.maximum(logits, config.crust_logit), logits)
+    return np.where(crust, np.maximum(limited, config.crust_logit), limited)
 
 
 def empty_space(

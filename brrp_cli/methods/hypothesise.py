@@ -8,17 +8,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brrp_cli.completion.part import seen_part
-from brrp_cli.config import Config, HypothesesConfig, WeighConfig
+from brrp_cli.config import Config, HypothesesConfig, MeanConfig, WeighConfig
 from brrp_cli.frames.frame import Frame
 from brrp_cli.frames.observe import ObjectObservation
 from brrp_cli.frames.plane import Plane
 from brrp_cli.geometry import transform_points
 from brrp_cli.inference.hypothesis_posterior import HypothesisPosterior
 from brrp_cli.inference.infer import LabelledPoints
-from brrp_cli.inference.infer_hypotheses import Problem, infer_correction
+from brrp_cli.inference.infer_hypotheses import Problem, infer_correction, share_out
 from brrp_cli.inference.mean import (
     MeanLattice,
-    completed_logits,
+    completed_lattice,
     empty_space,
     lattice_over,
     shape_logits,
@@ -61,17 +61,19 @@ def reconstruct_by_hypotheses(
     with timed(seconds, "registration"):
         testimony = Testimony(_shuffled(observation.points, seed, object_id), frame, plane)
         observed = observed_cloud(observation.points, config.features)
-        found = [
-            search(
-                search_model(prior.load(name)),
-                observed,
-                testimony,
-                config.features,
-                hypotheses.search,
-                child_seed(seed, object_id),
+        found: list[list[Hypothesis]] = []
+        for name, _ in chosen:
+            found.append(
+                search(
+                    search_model(prior.load(name)),
+                    observed,
+                    testimony,
+                    config.features,
+                    hypotheses.search,
+                    child_seed(seed, object_id),
+                    max((each.evidence for group in found for each in group), default=-np.inf),
+                )
             )
-            for name, _ in chosen
-        ]
     with timed(seconds, "inference"):
         placed = [each for group in found for each in group]
         shares = [p for (_, p), group in zip(chosen, found, strict=True) for _ in group]
@@ -130,38 +132,44 @@ def _infer(
     seed: int,
     device: str,
 ) -> HypothesisPosterior:
-    """Only hypotheses that a particle may get cost a mean function."""
-    kept = np.flatnonzero(weights > 0.5 / config.map.particles / len(weights))
-    part = seen_part(observation.points, frame, observation.object_id, plane, config.completion)
+    """Only hypotheses that a particle gets cost a mean function."""
+    kept, which = np.unique(share_out(weights, config.map.particles), return_inverse=True)
+    part = None
+    if len(placed) in kept:
+        part = seen_part(observation.points, frame, observation.object_id, plane, config.completion)
     extent = np.concatenate(
-        [part.extent if i == len(placed) else _surface(placed[i]) for i in kept]
-        + [observation.points]
+        [observation.points]
+        + [_surface(placed[i]) for i in kept if i < len(placed)]
+        + ([] if part is None else [part.extent])
     )
     margin = config.map.margin
     box = np.stack([extent.min(axis=0) - margin, extent.max(axis=0) + margin])
     lower, spacing, nodes = lattice_over(box, config.mean)
-    points = nodes.reshape(-1, 3)
-    empty = empty_space(points, frame, observation.object_id, plane, config.mean)
-    logits = np.full((len(kept), len(points)), -config.mean.limit)
-    for row, i in enumerate(kept):
-        logits[row, ~empty] = (
-            completed_logits(points[~empty], part, config.mean)
-            if i == len(placed)
-            else shape_logits(_distance(placed[i], points[~empty]), placed[i].evidence, config.mean)
-        )
-    values = logits.reshape(-1, *nodes.shape[:3])
-    mean = MeanLattice(lower, spacing, values.astype(np.float16), outside=-config.mean.limit)
+    empty = empty_space(nodes.reshape(-1, 3), frame, observation.object_id, plane, config.mean)
+    empty = empty.reshape(nodes.shape[:3])
+    mean = [
+        completed_lattice(nodes, empty, part, config.mean)
+        if part is not None and i == len(placed)
+        else _placed_lattice(nodes, empty, placed[i], config.mean)
+        for i in kept
+    ]
+    lattice = MeanLattice(lower, spacing, np.stack(mean), outside=-config.mean.limit)
     return infer_correction(
-        Problem(
-            LabelledPoints(observation.samples, observation.labels),
-            mean,
-            weights[kept] / weights[kept].sum(),
-            box,
-        ),
+        Problem(LabelledPoints(observation.samples, observation.labels), lattice, which, box),
         config.map,
         seed=child_seed(seed, observation.object_id),
         device=device,
     )
+
+
+def _placed_lattice(
+    nodes: Array, empty: NDArray[np.bool_], hypothesis: Hypothesis, config: MeanConfig
+) -> NDArray[np.float16]:
+    """Logits (nx, ny, nz) of a placed shape at nodes (nx, ny, nz, 3), but where it is empty."""
+    logits = np.full(empty.shape, -config.limit, np.float16)
+    distance = _distance(hypothesis, nodes[~empty])
+    logits[~empty] = shape_logits(distance, hypothesis.evidence, config)
+    return logits
 
 
 def _surface(hypothesis: Hypothesis) -> Array:

@@ -8,6 +8,7 @@ goes on as if it had not been (on the CPU to the last bit; CUDA adds in no fixed
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
@@ -39,6 +40,7 @@ class TrainingConfig:
     batch : objects in a step; queries : of each, drawn anew for each step
     noise : metres, standard deviation of each coordinate of a cloud's points
     precision : "float32" or "bfloat16", of the products; weights are float32 either way
+    cooling : epochs at the end over which the learning rate falls to nothing, by half a cosine
     """
 
     epochs: int = 50
@@ -48,6 +50,7 @@ class TrainingConfig:
     learning_rate: float = 1e-3
     precision: str = "float32"
     seed: int = 0
+    cooling: int = 0
 
 
 @dataclass
@@ -111,6 +114,7 @@ class Training:
                 if not go_on():
                     self.save()
                     return False
+                self.set_rate(state.epoch + step / len(batches))
                 loss = self.step(train, batches[step], step)
                 state.losses.append(loss)
                 state.step += 1
@@ -173,9 +177,10 @@ class Training:
         )
 
     def _fixed(self) -> dict[str, Any]:
-        """What a training cannot change on its way: all but the number of epochs."""
+        """What a training cannot change on its way: all but when it ends and how it cools."""
         config = asdict(self.config)
         config.pop("epochs")
+        config.pop("cooling")
         return json.loads(
             json.dumps(
                 {
@@ -185,6 +190,13 @@ class Training:
                 }
             )
         )
+
+    def set_rate(self, epoch: float) -> None:
+        """The learning rate after `epoch` epochs, a fraction too, of this training."""
+        for group in self.optimizer.param_groups:
+            group["lr"] = self.config.learning_rate * cooled(
+                epoch, self.config.epochs, self.config.cooling
+            )
 
     def settle(self, train: Examples, batches: list[NDArray[np.int64]]) -> None:
         """Batch normalisation's statistics anew: the mean of those by which these batches are
@@ -249,6 +261,13 @@ class Training:
             self.config.noise / self.network.config.scale,
             child_rng(self.config.seed, purpose, self.progress.epoch, step),
         )
+
+
+def cooled(epoch: float, epochs: int, cooling: int) -> float:
+    """The share of the learning rate after `epoch` epochs: 1, then half a cosine down to 0 over the
+    last `cooling` of `epochs`."""
+    past = epoch - (epochs - cooling)
+    return 1.0 if past <= 0 else (1 + math.cos(math.pi * past / cooling)) / 2
 
 
 def draw_batch(

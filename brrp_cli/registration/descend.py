@@ -13,22 +13,24 @@ from brrp_cli.registration.model import Model
 
 Array = NDArray[np.float64]
 
-ITERATIONS = 15
 # Placements that turn (radians) and move (metres) by less in a step stand still.
 STILL = 2e-5
 # Of the mean diagonal: what is not seen of a ball's turn is not turned.
 DAMPING = 1e-6
 
 
-def descend(T_model_cam: Array, observed: Array, model: Model, distance: float) -> Array:
+def descend(
+    T_model_cam: Array, observed: Array, model: Model, distance: float, iterations: int
+) -> Array:
     """T_model_cam (B, 4, 4), similarities, each followed by the rigid motion that brings observed
     points (n, 3), metres, camera frame, onto the model's surface.
 
-    distance : points further from it than that, metres of the model, do not pull.
+    distance : points further from it than that, metres of the model, do not pull
+    iterations : steps at most; a placement that stands still is left alone before
     """
     T = T_model_cam.copy()
     moving = np.arange(len(T))
-    for _ in range(ITERATIONS):
+    for _ in range(iterations):
         # The axis comes first: long contiguous rows are what NumPy is fast on.
         points = T[moving, :3, :3].swapaxes(0, 1) @ observed.T
         points += T[moving, :3, 3].T[..., None]

@@ -15,8 +15,7 @@ from numpy.typing import NDArray
 from brrp_cli.config import FeatureConfig, SearchConfig
 from brrp_cli.geometry import transform_points
 from brrp_cli.registration.descend import descend
-from brrp_cli.registration.model import COARSE, FINE, Model
-from brrp_cli.registration.refine import refine
+from brrp_cli.registration.model import COARSE, Model
 from brrp_cli.registration.scan import ObservedCloud
 from brrp_cli.registration.starts import matched_starts, resting_starts
 from brrp_cli.registration.testimony import Testimony
@@ -50,24 +49,28 @@ def search(
     features: FeatureConfig,
     config: SearchConfig,
     seed: int,
+    best: float = -np.inf,
 ) -> list[Hypothesis]:
-    """The best placements of one model that differ in shape, best first, `config.kept` at most."""
+    """The best placements of one model that differ in shape, best first, `config.kept` at most.
+
+    best : evidence that another model has reached
+    """
     starts = matched_starts(model, observed, features, config.matching, config.matchings, seed)
     if testimony.plane is not None:
         starts += resting_starts(model, testimony.points, testimony.plane, config.turns)
     T, _ = _best(np.stack(starts), model, testimony, config, config.coarse)
-    T = _slid(T, model, testimony, config)
-    T, best = _best(T, model, testimony, config, config.fine)
-    if best < config.hopeless:
+    T = _slid(T, model, testimony, config.coarse_points, config.coarse_distance, config.coarse_steps)
+    T, _ = _best(T, model, testimony, config, config.middle)
+    T = _slid(T, model, testimony, config.middle_points, config.coarse_distance, config.middle_steps)
+    T, reached = _best(T, model, testimony, config, config.fine)
+    if reached < max(config.hopeless, best - config.beaten):
         return _distinct(_judged(T, 1.0, model, testimony, config), config)
-    T = _refined(T, 1.0, model, testimony, config.fine_distance, config.fine_points)
+    T = _slid(T, model, testimony, config.fine_points, config.fine_distance, config.fine_steps)
     found = _judged(T, 1.0, model, testimony, config)
     parents = [each.T_cam_model for each in found[: config.rescaled]]
     for scale in config.scales if found[0].evidence < config.settled else ():
         resized = np.stack([_resize(parent, scale, testimony) for parent in parents])
-        resized = _refined(
-            resized, scale, model, testimony, config.scale_distance, config.coarse_points
-        )
+        resized = _slid(resized, model, testimony, config.middle_points, config.scale_distance, config.middle_steps)
         found += _judged(resized, scale, model, testimony, config)
     return _distinct(sorted(found, key=lambda each: -each.evidence), config)
 
@@ -120,36 +123,14 @@ def _judged(
     return sorted(found, key=lambda each: -each.evidence)
 
 
-def _slid(T_cam_model: Array, model: Model, testimony: Testimony, config: SearchConfig) -> Array:
-    """Each placement (B, 4, 4), at the model's own size, with the coarse observed points brought
-    onto its surface."""
-    T_model_cam = np.asarray(np.linalg.inv(T_cam_model), dtype=np.float64)
-    seen = testimony.points[: config.coarse_points]
-    return np.asarray(np.linalg.inv(descend(T_model_cam, seen, model, config.coarse_distance)))
-
-
-def _refined(
-    T_cam_model: Array,
-    scale: float,
-    model: Model,
-    testimony: Testimony,
-    distance: float,
-    points: int,
+def _slid(
+    T_cam_model: Array, model: Model, testimony: Testimony, points: int, distance: float, steps: int
 ) -> Array:
-    """Each placement (B, 4, 4) after ICP that keeps its scale, which is that of all; pairs further
-    apart than `distance` metres do not pull."""
+    """Each placement (B, 4, 4) with so many observed points brought onto its surface; its size
+    stays. Points further from it than `distance` metres do not pull."""
+    T_model_cam = np.asarray(np.linalg.inv(T_cam_model), dtype=np.float64)
     seen = testimony.points[:points]
-    # ICP turns about the origin: at the object it needs no long way.
-    center = seen.mean(axis=0)
-    T_center_model = T_cam_model.copy()
-    T_center_model[:, :3, :3] /= scale
-    T_center_model[:, :3, 3] -= center
-    refined = refine(
-        T_center_model, seen - center, model.surface[:FINE] * scale, model.normals[:FINE], distance
-    )
-    refined[:, :3, :3] *= scale
-    refined[:, :3, 3] += center
-    return refined
+    return np.asarray(np.linalg.inv(descend(T_model_cam, seen, model, distance, steps)))
 
 
 def _resize(T_cam_model: Array, scale: float, testimony: Testimony) -> Array:

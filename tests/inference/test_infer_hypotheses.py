@@ -41,7 +41,8 @@ def mean_of(*distances):
 
 def infer(observed, *distances, weights=None, seed=0, config=CONFIG):
     weights = np.full(len(distances), 1 / len(distances)) if weights is None else weights
-    return infer_correction(Problem(observed, mean_of(*distances), weights, BOX), config, seed=seed)
+    which = share_out(weights, config.particles)
+    return infer_correction(Problem(observed, mean_of(*distances), which, BOX), config, seed=seed)
 
 
 def around(count, seed=3):

@@ -77,7 +77,7 @@ def test_placements_slide_onto_the_surface(model, surface, scale):
     observed = transform_points(T_cam_true, surface)
     T_true_cam = np.linalg.inv(T_cam_true)
     starts = np.stack([moved(seed, 8, 0.008) @ T_true_cam for seed in range(6)])
-    found = descend(starts, observed, model, 0.03)
+    found = descend(starts, observed, model, 0.03, 15)
     for start, T in zip(starts, found, strict=True):
         before, after = (np.abs(box_distance(transform_points(t, observed))) for t in (start, T))
         assert after.mean() < 2e-4 < before.mean()
