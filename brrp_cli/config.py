@@ -112,10 +112,12 @@ class SearchConfig:
     """Hypotheses about one stored object's pose.
 
     Starts are `matchings` feature matchings and every resting pose turned `turns` times. The best
-    `coarse` of them are refined and judged, the best `fine` of those again. The best `rescaled`
-    are then tried at `scales` times the true size; evidence falls by scale_cost * ln(scale)^2.
-    No other size is tried where evidence reaches `settled`, and nothing is refined further where
-    none of the coarse placements reaches `hopeless`.
+    `coarse` of them slide `coarse_steps` steps with `coarse_points` observed points, which reach
+    the surface from `coarse_distance`; the best `middle` of those, and then the best `fine`, slide
+    again, each with more points. The best `rescaled` are then tried at `scales` times the true
+    size; evidence falls by scale_cost * ln(scale)^2. No other size is tried where evidence reaches
+    `settled`, and nothing is refined further where none of the placements reaches `hopeless` or
+    all stay `beaten` behind another model's.
     Of placements whose surfaces lie within `distinct` metres the best is kept, `kept` in all.
     """
 

@@ -84,16 +84,11 @@ def shape_logits(distance: Array, evidence: float, config: MeanConfig) -> Array:
     return np.asarray(logits)
 
 
-def completed_logits(points: Array, part: SeenPart, config: MeanConfig) -> Array:
-    """Logits (n,) at points (n, 3), metres, camera frame, of an object that is none of the stored
-    ones."""
-    return _with_crust(fitted().logits(lengths(points, part)), points, part, config)
-
-
 def completed_lattice(
     nodes: Array, empty: NDArray[np.bool_], part: SeenPart, config: MeanConfig
 ) -> NDArray[np.float16]:
-    """`completed_logits` (nx, ny, nz) at nodes (nx, ny, nz, 3), but where it is empty.
+    """Logits (nx, ny, nz) at nodes (nx, ny, nz, 3), metres, camera frame, of an object that is none
+    of the stored ones; the least where it is empty.
 
     The network is asked at every second node along each axis; between them its logits are linear.
     """

@@ -10,12 +10,12 @@ from brrp_cli.frames.observe import ObjectObservation
 from brrp_cli.geometry import transform_points
 from brrp_cli.inference.infer import LabelledPoints, infer_posterior
 from brrp_cli.methods.base import OK, ObjectReconstruction, Retrieved
-from brrp_cli.methods.timing import timed
 from brrp_cli.prior.objects import PriorObject
 from brrp_cli.prior.store import Prior
 from brrp_cli.registration.scan import ObservedCloud, observed_cloud, register
 from brrp_cli.retrieval.base import Retriever, top_k, unknown
 from brrp_cli.seeds import child_seed
+from brrp_cli.timing import timed
 
 
 def reconstruct_object(

@@ -25,7 +25,6 @@ from brrp_cli.inference.mean import (
 )
 from brrp_cli.methods.base import OK, ObjectReconstruction, Retrieved
 from brrp_cli.methods.check_prior import no_distances
-from brrp_cli.methods.timing import timed
 from brrp_cli.prior.store import Prior
 from brrp_cli.registration.model import search_model
 from brrp_cli.registration.scan import observed_cloud
@@ -33,6 +32,7 @@ from brrp_cli.registration.search import Hypothesis, search
 from brrp_cli.registration.testimony import Testimony
 from brrp_cli.retrieval.base import Retriever, top_k, unknown
 from brrp_cli.seeds import child_rng, child_seed
+from brrp_cli.timing import timed
 
 Array = NDArray[np.float64]
 

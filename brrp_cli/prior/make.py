@@ -20,17 +20,25 @@ from brrp_cli.prior.poses import resting_poses
 from brrp_cli.prior.repair import repair
 from brrp_cli.prior.samples import draw_samples, surface_points
 from brrp_cli.seeds import child_rng
+from brrp_cli.timing import timed
 
 LIBRARIES = ("brrp-cli", "manifold3d", "numpy", "open3d", "pymeshlab", "scipy", "trimesh")
 
 
-def make_object(source: MeshSource, parameters: BuildParameters) -> PriorObject:
+def make_object(
+    source: MeshSource, parameters: BuildParameters, seconds: dict[str, float] | None = None
+) -> PriorObject:
     """Load, repair, sample, describe geometrically. The description is left empty: the manifest
-    holds it. Errors: MeshError, with the file in `where`."""
-    original = load_mesh(source.path, parameters.units)
-    painted, trouble = _painted(source, original.copy(), parameters)
+    holds it. Errors: MeshError, with the file in `where`.
+
+    seconds : gets how long each stage took
+    """
+    seconds = {} if seconds is None else seconds
+    with timed(seconds, "load"):
+        original = load_mesh(source.path, parameters.units)
+        painted, trouble = _painted(source, original.copy(), parameters)
     try:
-        return _from_mesh(source.name, original, painted, trouble, parameters)
+        return _from_mesh(source.name, original, painted, trouble, parameters, seconds)
     except BrrpError as error:
         error.where = error.where or source.path
         raise
@@ -52,15 +60,19 @@ def _from_mesh(  # type: ignore[no-untyped-def]
     painted: PaintedMesh,
     trouble: str | None,
     parameters: BuildParameters,
+    seconds: dict[str, float],
 ) -> PriorObject:
     # Far from the origin float32 has no digits left for the shape: work around the centre.
     offset = original.bounds.mean(axis=0)
     original.apply_translation(-offset)
-    with np.errstate(divide="ignore", invalid="ignore"):  # trimesh: centres of flat parts
+    # trimesh: centres of flat parts
+    with timed(seconds, "repair"), np.errstate(divide="ignore", invalid="ignore"):
         repaired = repair(original)
     mesh = repaired.mesh
-    poses = resting_poses(mesh, parameters.poses)
-    appearance = describe_appearance(painted, mesh, poses, parameters.appearance)
+    with timed(seconds, "poses"):
+        poses = resting_poses(mesh, parameters.poses)
+    with timed(seconds, "appearance"):
+        appearance = describe_appearance(painted, mesh, poses, parameters.appearance)
     poses = [
         dataclasses.replace(pose, T_plane_object=_moved(pose.T_plane_object, -offset))
         for pose in poses
@@ -71,13 +83,19 @@ def _from_mesh(  # type: ignore[no-untyped-def]
     mesh.apply_translation(-center)
     mesh.apply_scale(1 / half_extent)
     seed = parameters.seed
-    samples, labels = draw_samples(
-        mesh, parameters.samples, parameters.mix, child_rng(seed, name, "samples")
-    )
-    dense, dense_normals = surface_points(
-        mesh, parameters.dense_points, child_rng(seed, name, "surface")
-    )
-    surface, normals = spread(dense, dense_normals, parameters.surface_points)
+    with timed(seconds, "samples"):
+        samples, labels = draw_samples(
+            mesh, parameters.samples, parameters.mix, child_rng(seed, name, "samples")
+        )
+    with timed(seconds, "surface"):
+        dense, dense_normals = surface_points(
+            mesh, parameters.dense_points, child_rng(seed, name, "surface")
+        )
+        surface, normals = spread(dense, dense_normals, parameters.surface_points)
+    with timed(seconds, "features"):
+        clouds = feature_clouds(dense, dense_normals, parameters.features)
+    with timed(seconds, "distances"):
+        distances = distance_field(mesh, parameters.distances)
     return PriorObject(
         name=name,
         description="",
@@ -87,7 +105,7 @@ def _from_mesh(  # type: ignore[no-untyped-def]
         labels=labels,
         surface=surface.astype(np.float32),
         surface_normals=normals.astype(np.float32),
-        clouds=feature_clouds(dense, dense_normals, parameters.features),
+        clouds=clouds,
         poses=poses,
         record={
             "extents": extents.tolist(),
@@ -101,7 +119,7 @@ def _from_mesh(  # type: ignore[no-untyped-def]
             "made_with": {library: library_version(library) for library in LIBRARIES},
         },
         appearance=appearance,
-        distances=distance_field(mesh, parameters.distances),
+        distances=distances,
     )
 
 

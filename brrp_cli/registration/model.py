@@ -11,9 +11,9 @@ from brrp_cli.geometry import similarity
 from brrp_cli.methods.check_prior import no_distances
 from brrp_cli.prior.objects import PriorObject
 
-# Surface points that the coarse search and ICP use. The stored points come in random order, so that
-# every leading part covers the surface.
-COARSE, FINE = 300, 2000
+# Surface points that the coarse search uses. The stored points come in random order, so that every
+# leading part covers the surface.
+COARSE = 300
 
 
 @dataclass(frozen=True)

@@ -59,9 +59,13 @@ def search(
     if testimony.plane is not None:
         starts += resting_starts(model, testimony.points, testimony.plane, config.turns)
     T, _ = _best(np.stack(starts), model, testimony, config, config.coarse)
-    T = _slid(T, model, testimony, config.coarse_points, config.coarse_distance, config.coarse_steps)
+    T = _slid(
+        T, model, testimony, config.coarse_points, config.coarse_distance, config.coarse_steps
+    )
     T, _ = _best(T, model, testimony, config, config.middle)
-    T = _slid(T, model, testimony, config.middle_points, config.coarse_distance, config.middle_steps)
+    T = _slid(
+        T, model, testimony, config.middle_points, config.coarse_distance, config.middle_steps
+    )
     T, reached = _best(T, model, testimony, config, config.fine)
     if reached < max(config.hopeless, best - config.beaten):
         return _distinct(_judged(T, 1.0, model, testimony, config), config)
@@ -70,7 +74,14 @@ def search(
     parents = [each.T_cam_model for each in found[: config.rescaled]]
     for scale in config.scales if found[0].evidence < config.settled else ():
         resized = np.stack([_resize(parent, scale, testimony) for parent in parents])
-        resized = _slid(resized, model, testimony, config.middle_points, config.scale_distance, config.middle_steps)
+        resized = _slid(
+            resized,
+            model,
+            testimony,
+            config.middle_points,
+            config.scale_distance,
+            config.middle_steps,
+        )
         found += _judged(resized, scale, model, testimony, config)
     return _distinct(sorted(found, key=lambda each: -each.evidence), config)
 

@@ -31,9 +31,10 @@ HIDDEN = 0.015
 def resting_starts(model: Model, points: Array, plane: Plane, turns: int) -> list[Array]:
     """T_cam_model (4, 4) of the model in each resting pose, turned about the plane's normal.
 
-    points : (n, 3) observed, metres, camera frame, in random order. Along the plane, the box of the model's side
-    that faces the camera is laid over the box of the observed points. Where that side is longer
-    than what is seen, a part of it is hidden, and what is seen is laid over each of its ends too.
+    points : (n, 3) observed, metres, camera frame, in random order. Along the plane, the box of
+    the model's side that faces the camera is laid over the box of the observed points. Where that
+    side is longer than what is seen, a part of it is hidden, and what is seen is laid over each of
+    its ends too.
     """
     if not model.resting:
         return []

@@ -54,7 +54,8 @@ class Testimony:
         others are, so that a search that explains nothing yet still has a slope."""
         linear = T_cam_model[:, :3, :3]
         scale = np.cbrt(np.linalg.det(linear))
-        in_model = _placed(np.linalg.inv(T_cam_model), seen)
+        T_model_cam = np.asarray(np.linalg.inv(T_cam_model), dtype=np.float64)
+        in_model = _placed(T_model_cam, seen)
         distance = np.abs(model.signed_distance(in_model.reshape(3, -1).T))
         distance = distance.reshape(in_model.shape[1:]) * scale[:, None]
         near = np.exp(-0.5 * (distance / config.near) ** 2).mean(axis=1)

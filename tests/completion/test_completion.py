@@ -12,12 +12,13 @@ from brrp_cli.completion.around import COUNT, lengths
 from brrp_cli.completion.network import Network, fitted, from_bytes
 from brrp_cli.completion.part import seen_part
 from brrp_cli.config import CompletionConfig, MeanConfig
+from brrp_cli.frames.lookup import at_pixels, depth_behind
 from brrp_cli.frames.plane import Plane
 from brrp_cli.geometry import transform_points
-from brrp_cli.inference.mean import completed_logits, empty_space
+from brrp_cli.inference.mean import MeanLattice, completed_lattice, empty_space, lattice_over
 from brrp_cli.shapes import solids
 
-CONFIG = CompletionConfig()
+CONFIG, MEAN = CompletionConfig(), MeanConfig()
 
 
 def photographed(mesh, T_cam_mesh):
@@ -29,11 +30,20 @@ def part_of(frame, plane=TABLE, points=None):
     return seen_part(points, frame, 5, plane, CONFIG)
 
 
+def completed(frame, config=MEAN, margin=0.05):
+    """The lattice's nodes, their logits, and which are seen to be empty."""
+    part = part_of(frame)
+    extent = part.extent
+    box = np.stack([extent.min(axis=0) - margin, extent.max(axis=0) + margin])
+    lower, spacing, nodes = lattice_over(box, config)
+    empty = empty_space(nodes.reshape(-1, 3), frame, 5, TABLE, config).reshape(nodes.shape[:3])
+    logits = completed_lattice(nodes, empty, part, config)
+    return nodes, MeanLattice(lower, spacing, logits[None], -config.limit), empty
+
+
 def inside(frame, points):
-    """What is occupied, more likely than not, and not seen to be empty."""
-    config = MeanConfig()
-    found = completed_logits(points, part_of(frame), config) > 0
-    return found & ~empty_space(points, frame, 5, TABLE, config)
+    """What is occupied, more likely than not."""
+    return completed(frame)[1].logits(points)[0] > 0
 
 
 def iou(frame, T_cam_mesh, contains, half, count=20_000):
@@ -76,23 +86,42 @@ def test_it_stands_on_the_plane_and_does_not_stick_out_at_the_top():
 def test_a_cup_that_is_looked_into_stays_hollow():
     T = placed(0.0, 0.0, 0.0)
     frame = photographed(solids.beaker(0.04, 0.04, 0.06, 0.004), T)
-    middle, wall = transform_points(T, np.array([[0, 0, 0.04], [0, -0.038, 0.03]]))
-    probability = completed_logits(np.stack([middle, wall]), part_of(frame), MeanConfig())
-    assert empty_space(middle[None], frame, 5, TABLE, MeanConfig())[0] or probability[0] < 0
+    assert not inside(frame, transform_points(T, np.array([[0, 0, 0.04]])))[0]
 
 
 def test_what_is_seen_has_some_thickness_whatever_the_network_says():
     frame = photographed(solids.beaker(0.04, 0.04, 0.06, 0.004), placed(0.0, 0.0, 0.0))
-    part = part_of(frame)
-    seen = frame.object_points(5).astype(np.float64)
-    ray = seen / np.linalg.norm(seen, axis=1, keepdims=True)
-    config, without = MeanConfig(), replace(MeanConfig(), crust=0.0)
-    behind, before = seen + 0.003 * ray, seen - 0.003 * ray
-    assert (completed_logits(behind, part, without) < 0).any()
-    assert (completed_logits(behind, part, config) >= config.crust_logit).all()
-    np.testing.assert_array_equal(
-        completed_logits(before, part, config), completed_logits(before, part, without)
+    nodes, crusted, empty = completed(frame)
+    _, bare, _ = completed(frame, replace(MEAN, crust=0.0))
+    with_crust, without = (
+        lattice.values[0].astype(float).ravel()[~empty.ravel()] for lattice in (crusted, bare)
     )
+    points = nodes.reshape(-1, 3)[~empty.ravel()]
+    behind = -depth_behind(points, frame)
+    seen = (at_pixels(points, frame.segmap, frame) == 5) & (behind > -0.001) & (behind < MEAN.crust)
+    assert (without[seen] < 0).any()
+    assert (with_crust[seen] >= MEAN.crust_logit).all()
+    np.testing.assert_array_equal(with_crust[~seen], without[~seen])
+
+
+def test_between_the_nodes_where_the_network_is_asked_its_logits_are_linear():
+    frame = photographed(box(), placed(0.0, 0.0, 0.3))
+    config = replace(MEAN, nodes=3_000, crust=0.0)
+    part = part_of(frame)
+    extent = part.extent
+    box_around = np.stack([extent.min(axis=0) - 0.01, extent.max(axis=0) + 0.01])
+    _, _, nodes = lattice_over(box_around, config)
+    # Along x the last node is asked, along y it lies beyond the last that is.
+    nodes = nodes[: (nodes.shape[0] - 1) // 2 * 2 + 1, : nodes.shape[1] // 2 * 2]
+    found = completed_lattice(nodes, np.zeros(nodes.shape[:3], bool), part, config)
+    asked = fitted().logits(lengths(nodes[::2, ::2, ::2].reshape(-1, 3), part))
+    asked = np.clip(asked, -config.limit, config.limit).reshape(found[::2, ::2, ::2].shape)
+    np.testing.assert_allclose(found[::2, ::2, ::2], asked, atol=0.02)
+    # Not where a limit cuts what lies between.
+    raw = fitted().logits(lengths(nodes[::2, :3:2, ::2].reshape(-1, 3), part))
+    raw = raw.reshape(*nodes[::2, :3:2, ::2].shape[:3])
+    between = np.clip(raw.mean(axis=1), -config.limit, config.limit)
+    np.testing.assert_allclose(found[::2, 1, ::2], between, atol=0.02)
 
 
 def test_a_part_has_the_extents_of_what_is_seen():

@@ -11,6 +11,7 @@ from brrp_cli.pointsdf.training import (
     HISTORY,
     Training,
     TrainingConfig,
+    cooled,
     draw_batch,
     evaluate,
     split,
@@ -73,6 +74,26 @@ def test_a_stopped_training_goes_on_and_may_become_longer(place, tmp_path):
     assert not first.run(place.examples, place.examples, go_on=lambda: next(steps))
     assert losses(tmp_path / "stopped", place.examples)[0] == expected[3:8]
     assert losses(tmp_path / "stopped", place.examples, longer) == (expected[8:], epochs)
+
+
+def test_the_rate_falls_over_the_last_epochs_alone():
+    assert [cooled(epoch, 10, 4) for epoch in (0, 5.9, 6)] == [1, 1, 1]
+    falling = [cooled(epoch, 10, 4) for epoch in np.linspace(6, 10, 9)]
+    assert falling == sorted(falling, reverse=True)
+    assert cooled(8, 10, 4) == pytest.approx(0.5) and cooled(10, 10, 4) == pytest.approx(0)
+    assert [cooled(epoch, 10, 0) for epoch in (0, 9.9, 10)] == [1, 1, 1]
+
+
+def test_a_cooling_training_goes_on_to_the_same_losses(place, tmp_path):
+    cooling = replace(CONFIG, epochs=3, cooling=2)
+    expected, epochs = losses(tmp_path / "whole", place.examples, cooling)
+    steps = iter([True] * 6 + [False])
+    first = training(tmp_path / "stopped", cooling)
+    assert not first.run(place.examples, place.examples, go_on=lambda: next(steps))
+    assert losses(tmp_path / "stopped", place.examples, cooling) == (expected[6:], epochs)
+    # What is cooled differs from the first cooled step on.
+    steady, _ = losses(tmp_path / "steady", place.examples, replace(cooling, cooling=0))
+    assert steady[:6] == expected[:6] and steady[6:] != expected[6:]
 
 
 def test_the_weights_are_those_of_the_best_epoch(place, tmp_path):

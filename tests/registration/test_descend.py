@@ -86,7 +86,7 @@ def test_placements_slide_onto_the_surface(model, surface, scale):
 
 def test_a_placement_that_nothing_pulls_stays(model, surface):
     far = similarity(translation=np.array([1.0, 0, 0]))
-    found = descend(np.stack([far, np.eye(4)]), surface, model, 0.01)
+    found = descend(np.stack([far, np.eye(4)]), surface, model, 0.01, 15)
     np.testing.assert_array_equal(found[0], far)
     np.testing.assert_allclose(found[1], np.eye(4), atol=2e-3)
 

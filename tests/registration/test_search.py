@@ -19,7 +19,7 @@ ID = 5
 CONFIG = SearchConfig()
 
 
-def find(name, T_cam_mesh, *, size=1.0, plane=TABLE, seed=0, config=CONFIG):
+def find(name, T_cam_mesh, *, size=1.0, plane=TABLE, seed=0, config=CONFIG, best=-np.inf):
     """Hypotheses about an object of that many times the stored size, seen from the front."""
     mesh = MESHES[name]()
     mesh.apply_scale(size)
@@ -32,6 +32,7 @@ def find(name, T_cam_mesh, *, size=1.0, plane=TABLE, seed=0, config=CONFIG):
         PARAMETERS.features,
         config,
         seed,
+        best,
     )
 
 
@@ -88,6 +89,17 @@ def test_what_is_hopeless_is_judged_as_it_lies():
     truth = placed(0.0, 0.03, 1.2)
     left = find("ell", truth, size=0.8, config=replace(CONFIG, hopeless=np.inf, settled=np.inf))
     assert left and {each.scale for each in left} == {1.0}
+
+
+def test_what_another_model_has_beaten_is_judged_as_it_lies():
+    truth = placed(0.0, 0.03, 1.2)
+    config = replace(CONFIG, settled=np.inf)
+    close, beaten = (
+        find("ell", truth, size=0.8, config=config, best=best)
+        for best in (CONFIG.beaten, 1 + CONFIG.beaten)
+    )
+    assert {each.scale for each in beaten} == {1.0} and beaten[0].evidence < close[0].evidence
+    assert close[0].scale == 0.8
 
 
 def test_without_a_plane_feature_matchings_are_enough():

@@ -11,15 +11,17 @@ from pathlib import Path
 import numpy as np
 import torch
 
+from brrp_cli.completion.around import COUNT
 from brrp_cli.config import Config
+from brrp_cli.registration.model import COARSE
 from brrp_cli.threads import cores
 
 TRIES = 5
-# Operations of one descent to the nearest of 2,000 points in a k-d tree, and bytes of the nodes on
-# the way: 11 levels and about two leaves of 8 points.
-DESCENT, DESCENT_BYTES = 11 * 4 + 16 * 8, 11 * 32 + 16 * 24
-# Iterations until ICP stands still, as measured.
-ICP_STEPS = 12
+# Operations on a point that slides: placed (18), value and slope between eight nodes (60), a row of
+# six and what it adds to a 6 x 6 matrix (60); on one that is judged: placed, looked up (40).
+SLID, JUDGED = 138, 60
+# Bytes of the eight nodes or the pixel, and of the point.
+SLID_BYTES, JUDGED_BYTES = 8 * 4 + 12, 8 * 4 + 12
 
 
 @dataclass(frozen=True)
@@ -62,27 +64,25 @@ def limits(machine: Machine, config: Config, samples: int) -> dict[str, Limit]:
     search, fitted, nodes = hypotheses.search, hypotheses.map, hypotheses.mean.nodes
 
     starts = search.matchings + 8 * search.turns
-    judged = starts * (300 + search.seen_points) + (search.coarse + search.fine) * (
-        300 + search.seen_points
+    judged = (starts + search.coarse + search.middle) * (COARSE + search.seen_points)
+    judged += (search.fine + len(search.scales) * search.rescaled) * 2 * search.fine_points
+    slid = (
+        search.coarse * search.coarse_points * search.coarse_steps
+        + search.middle * search.middle_points * search.middle_steps
+        + search.fine * search.fine_points * search.fine_steps
+        + len(search.scales) * search.rescaled * search.middle_points * search.middle_steps
     )
-    refined = (
-        search.coarse * search.coarse_points
-        + search.fine * search.fine_points
-        + len(search.scales) * search.rescaled * search.coarse_points
-    )
-    # A point that is judged: placed (18), projected or looked up between eight nodes (40).
-    # A pair of ICP: the nearest point, and 21 entries of a 6 x 6 matrix.
-    queries = refined * ICP_STEPS
-    placing = config.k * (judged * 60 + queries * (DESCENT + 60))
+    placing = config.k * (judged * JUDGED + slid * SLID)
     placing += config.k * search.matchings * search.matching.iterations * 40
-    placing_bytes = config.k * (judged * 64 + queries * DESCENT_BYTES)
+    placing_bytes = config.k * (judged * JUDGED_BYTES + slid * SLID_BYTES)
 
     hinges, particles = fitted.hinges, fitted.particles
     steps = 4 * fitted.steps * fitted.batch * hinges * particles
     steps_bytes = fitted.steps * 4 * (fitted.batch * hinges / 10 + 6 * particles * hinges)
-    # The network of the completion: two hidden layers of 64; each other mean looks up eight nodes.
-    means = nodes * (2 * (35 * 64 + 64 * 64) + search.kept * 40)
-    means_bytes = nodes * 4 * (35 + 2 * 64 + 8 * search.kept)
+    # The network of the completion, at every eighth node: two hidden layers of 64; each other mean
+    # looks up eight nodes.
+    means = nodes * ((COUNT * 64 + 64 * 64) / 4 + search.kept * 40)
+    means_bytes = nodes * 4 * ((COUNT + 2 * 64) / 8 + 8 * search.kept)
     # Separable, axis after axis: the last axis costs most.
     side = hinges ** (1 / 3)
     volume = 2 * particles * nodes * side + particles * nodes * 20

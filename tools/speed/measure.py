@@ -71,10 +71,10 @@ sys.exit(code)
 """
 
 
-def cold_reconstruct(frame: Path, prior: Path, output: Path) -> Cold:
-    """`brrp reconstruct FRAME` as a process of its own."""
-    command = [sys.executable, "-m", "brrp_cli", "-q", "reconstruct", str(frame)]
-    command += ["--prior", str(prior), "-o", str(output), "--overwrite"]
+def cold(*arguments: str | Path) -> Cold:
+    """`brrp ARGUMENTS` as a process of its own; of its workers the CPU counts too, and the memory
+    is that of the greatest of all. Errors: SystemExit if the command fails."""
+    command = [sys.executable, "-m", "brrp_cli", "-q", *map(str, arguments)]
     environment = os.environ | {"PYTHONPATH": str(Path(__file__).resolve().parents[2])}
     start = time.perf_counter()
     # Through a small process: a child's greatest memory begins with that of who started it.
@@ -86,9 +86,14 @@ def cold_reconstruct(frame: Path, prior: Path, output: Path) -> Cold:
         check=False,
     )
     if told.returncode:
-        raise SystemExit(f"brrp reconstruct ended with {told.returncode}")
+        raise SystemExit(f"brrp {arguments[0]} ended with {told.returncode}")
     cpu, kilobytes = (float(word) for word in told.stdout.split())
     return Cold(cpu, time.perf_counter() - start, kilobytes * 1024 / 1e6)
+
+
+def cold_reconstruct(frame: Path, prior: Path, output: Path) -> Cold:
+    """`brrp reconstruct FRAME` from nothing."""
+    return cold("reconstruct", frame, "--prior", prior, "-o", output, "--overwrite")
 
 
 def peak_megabytes() -> float:
