@@ -124,7 +124,7 @@ class SearchConfig:
     turns: int = 24
     matchings: int = 4
     matching: RegistrationConfig = field(
-        default_factory=lambda: RegistrationConfig(iterations=10_000)
+        default_factory=lambda: RegistrationConfig(iterations=5_000)
     )
     coarse: int = 96
     coarse_distance: float = 0.03

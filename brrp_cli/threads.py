@@ -7,12 +7,15 @@ bits of a result. Each object has one thread, and the libraries none of their ow
 from __future__ import annotations
 
 import os
+import sys
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from typing import TypeVar
 
 from brrp_cli.dependencies import thread_pools
+
+TURN = 1e-4  # seconds
 
 S = TypeVar("S")
 T = TypeVar("T")
@@ -30,7 +33,7 @@ def in_threads(call: Callable[[S], T], items: Sequence[S], workers: int) -> Iter
         if workers <= 1:
             yield from map(call, items)
             return
-        with ThreadPoolExecutor(workers, "object", initializer=_hold) as pool:
+        with _short_turns(), ThreadPoolExecutor(workers, "object", initializer=_hold) as pool:
             futures = [pool.submit(call, item) for item in items]
             try:
                 for future in futures:
@@ -50,6 +53,18 @@ def _one_thread_each() -> Iterator[None]:
             yield
         finally:
             torch.set_num_threads(before)
+
+
+@contextmanager
+def _short_turns() -> Iterator[None]:
+    """Much of the work is small steps of NumPy, for which threads take turns in the interpreter:
+    who waits five milliseconds for his, as is usual, computes nothing meanwhile."""
+    before = sys.getswitchinterval()
+    sys.setswitchinterval(min(before, TURN))
+    try:
+        yield
+    finally:
+        sys.setswitchinterval(before)
 
 
 def _hold() -> None:

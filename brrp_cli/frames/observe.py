@@ -106,13 +106,15 @@ def ray_samples(
     """
     rng = child_rng(seed, "rays")
     radius, width = config.ray_radius, config.ray_bin
-    length = np.linalg.norm(points.astype(np.float64), axis=-1).astype(np.float32)
-    direction = points / length[:, None]
-    along = direction @ centers.T.astype(np.float32)  # (n, k): where each ray passes each centre
-    across = np.linalg.norm(centers, axis=-1) ** 2 - along.astype(np.float64) ** 2
+    # The axis comes first: long contiguous rows are what NumPy is fast on.
+    columns = np.ascontiguousarray(points.T)
+    length = np.sqrt(np.square(columns, dtype=np.float64).sum(axis=0)).astype(np.float32)
+    direction = columns / length
+    along = centers.astype(np.float32) @ direction  # (k, n): where each ray passes each centre
+    across = np.square(centers).sum(axis=1)[:, None] - np.square(along, dtype=np.float64)
     # Rays that pass no centre give no sample; the margin is for float32.
-    crossing = (across < (radius + 1e-3) ** 2).any(axis=-1)
-    length, direction = length[crossing], direction[crossing]
+    crossing = (across < (radius + 1e-3) ** 2).any(axis=0)
+    length, direction = length[crossing], direction[:, crossing]
 
     reach = np.linalg.norm(centers, axis=-1)
     first = max(0, int((reach.min() - radius) // width))
@@ -123,9 +125,9 @@ def ray_samples(
         reaching = length > start
         span = np.minimum(length[reaching] - start, np.float32(width))
         t = start + rng.random(len(span), dtype=np.float32) * span
-        draws = direction[reaching] * t[:, None]
-        kept.append(draws[_near_any(draws, centers, radius)])
-    samples = np.concatenate(kept)
+        draws = direction[:, reaching] * t
+        kept.append(draws[:, _near_any(draws.T, centers, radius)])
+    samples = np.ascontiguousarray(np.concatenate(kept, axis=1).T)
     if len(samples) > config.max_ray_samples:
         rows = child_rng(seed, "rays", "subset").choice(
             len(samples), config.max_ray_samples, replace=False
@@ -157,8 +159,8 @@ def _near_any(
 ) -> NDArray[np.bool_]:
     near = np.zeros(len(points), dtype=bool)
     for center in centers.astype(np.float32):
-        offset = points - center
-        near |= np.einsum("ij,ij->i", offset, offset) < radius**2
+        x, y, z = (points.T[axis] - center[axis] for axis in range(3))
+        near |= x * x + y * y + z * z < radius**2
     return near
 
 

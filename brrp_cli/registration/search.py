@@ -58,18 +58,21 @@ def search(
     starts = matched_starts(model, observed, features, config.matching, config.matchings, seed)
     if testimony.plane is not None:
         starts += resting_starts(model, testimony.points, testimony.plane, config.turns)
-    T, _ = _best(np.stack(starts), model, testimony, config, config.coarse)
+    T = np.stack(starts)
+    T, _ = _best(T, model, testimony, config, 2 * config.coarse, share=3)
+    T, _ = _best(T, model, testimony, config, config.coarse)
     T = _slid(
         T, model, testimony, config.coarse_points, config.coarse_distance, config.coarse_steps
     )
-    T, _ = _best(T, model, testimony, config, config.middle)
-    T = _slid(
-        T, model, testimony, config.middle_points, config.coarse_distance, config.middle_steps
-    )
-    T, reached = _best(T, model, testimony, config, config.fine)
-    if reached < max(config.hopeless, best - config.beaten):
-        return _distinct(_judged(T, 1.0, model, testimony, config), config)
-    T = _slid(T, model, testimony, config.fine_points, config.fine_distance, config.fine_steps)
+    least = max(config.hopeless, best - config.beaten)
+    for count, points, distance, steps in (
+        (config.middle, config.middle_points, config.coarse_distance, config.middle_steps),
+        (config.fine, config.fine_points, config.fine_distance, config.fine_steps),
+    ):
+        T, reached = _best(T, model, testimony, config, count)
+        if reached < least:
+            return _distinct(_judged(T[: config.fine], 1.0, model, testimony, config), config)
+        T = _slid(T, model, testimony, points, distance, steps)
     found = _judged(T, 1.0, model, testimony, config)
     parents = [each.T_cam_model for each in found[: config.rescaled]]
     for scale in config.scales if found[0].evidence < config.settled else ():
@@ -105,15 +108,21 @@ def _distinct(found: list[Hypothesis], config: SearchConfig) -> list[Hypothesis]
 
 
 def _best(
-    T_cam_model: Array, model: Model, testimony: Testimony, config: SearchConfig, count: int
+    T_cam_model: Array,
+    model: Model,
+    testimony: Testimony,
+    config: SearchConfig,
+    count: int,
+    share: int = 1,
 ) -> tuple[Array, float]:
-    """The `count` best placements by a first look at their evidence, and the best of that."""
+    """The `count` best placements by a first look at their evidence, with one of `share` of its
+    points, and the best of that."""
     score = testimony.score(
         T_cam_model,
         model,
         config.evidence,
-        model_points=COARSE,
-        seen_points=config.seen_points,
+        model_points=COARSE // share,
+        seen_points=config.seen_points // share,
     )
     order = np.argsort(-score, kind="stable")[:count]
     return np.asarray(T_cam_model[order]), float(score[order[0]])
