@@ -13,7 +13,7 @@ from brrp_cli.geometry import normalise, similarity
 from brrp_cli.seeds import child_seed
 
 MIN_PLANE_POINTS = 100
-_RANSAC_POINTS = 1_500
+_RANSAC_POINTS = 4_000
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,1 @@
+"""What tools/fuzz.py throws bytes at, and what it begins with."""
