@@ -18,6 +18,7 @@ from brrp_cli.config import PointSDFConfig
 from brrp_cli.frames.frame import Frame
 from brrp_cli.frames.observe import box_center
 from brrp_cli.methods.base import METRES, OK, TOO_FEW_POINTS, Axes, ObjectReconstruction
+from brrp_cli.methods.likely_lattice import likely_lattice
 from brrp_cli.pointsdf.farthest_points import farthest_points
 
 if TYPE_CHECKING:
@@ -29,10 +30,6 @@ LOGISTIC = np.pi / np.sqrt(3)
 LARGEST = 0.05  # metres; no surface is less certain than this
 STEP = 0.001  # metres, of difference quotients
 CHUNK = 16_384  # points that go through the network at once
-# A lattice is asked at every third node first, and at all nodes only where one of the corners
-# around is likelier than this to be occupied.
-COARSE = 3
-EMPTY = 0.02
 
 
 @dataclass(frozen=True)
@@ -78,31 +75,9 @@ class PointSDFPosterior:
         return result
 
     def probability_volume(self, axes: Axes) -> NDArray[np.float32]:
-        """`probability` (nx, ny, nz) on a lattice of camera-frame coordinates, metres.
-
-        Where it is under `EMPTY` all around, values lie between those of every third node.
-        """
-        from scipy.ndimage import map_coordinates, maximum_filter
-
-        coarse = self._lattice((axes[0][::COARSE], axes[1][::COARSE], axes[2][::COARSE]))
-        shape = tuple(len(axis) for axis in axes)
-        index = np.stack(np.meshgrid(*map(np.arange, shape), indexing="ij"), axis=-1)
-        # The last nodes of an axis may lie beyond the last coarse one: asked in any case.
-        cell = index // COARSE
-        beyond = (index > COARSE * (np.array(coarse.shape) - 1)).any(axis=-1)
-        likely = maximum_filter(coarse, size=3, mode="nearest") > EMPTY
-        asked = likely[tuple(np.moveaxis(cell, -1, 0))] | beyond
-        result = np.empty(shape, dtype=np.float32)
-        if not asked.all():
-            place = np.moveaxis(index[~asked], -1, 0) / COARSE
-            result[~asked] = map_coordinates(coarse, place, order=1, mode="nearest")
-        points = np.stack([axis[i] for axis, i in zip(axes, index[asked].T, strict=True)], axis=-1)
-        result[asked] = self.probability(points)
-        return result
-
-    def _lattice(self, axes: Axes) -> NDArray[np.float32]:
-        nodes = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
-        return self.probability(nodes.reshape(-1, 3)).reshape(nodes.shape[:3])
+        """`probability` (nx, ny, nz) on a lattice of camera-frame coordinates, metres; between
+        nodes where nothing is likely."""
+        return likely_lattice(self.probability, axes)
 
     def uncertainty(self, points: NDArray[np.floating]) -> NDArray[np.float32]:
         """Variance (n,) of occupancy, p (1 - p): all that a single network can say."""

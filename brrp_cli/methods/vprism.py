@@ -26,6 +26,7 @@ from brrp_cli.methods.base import (
     Axes,
     ObjectReconstruction,
 )
+from brrp_cli.methods.likely_lattice import likely_lattice
 from brrp_cli.seeds import child_rng
 
 
@@ -51,9 +52,9 @@ class VPrismPosterior:
         return result
 
     def probability_volume(self, axes: Axes) -> NDArray[np.float32]:
-        """`probability` (nx, ny, nz) on a lattice of camera-frame coordinates, metres."""
-        nodes = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
-        return self.probability(nodes.reshape(-1, 3)).reshape(nodes.shape[:3])
+        """`probability` (nx, ny, nz) on a lattice of camera-frame coordinates, metres; between
+        nodes where nothing is likely."""
+        return likely_lattice(self.probability, axes)
 
     @property
     def surface_unit(self) -> str:
