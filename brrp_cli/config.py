@@ -171,10 +171,11 @@ class MeanConfig:
     """Mean functions of hypotheses, logits on a lattice of about `nodes` nodes.
 
     A placed shape is -(signed distance - growth) / width, limited to +-limit; evidence under `sure`
-    widens it by `doubt` for each unit. An object that none explains has a logit of `crust_logit` at
-    least for `crust` metres behind what is seen of it. Space is empty that lies more than
-    `carve_depth` in front of the measured depth, or `carve_plane` below the plane, or less than
-    `carve_behind` behind what is no object's and more than `carve_pixels` from the mask.
+    widens it by `doubt` for each unit. An object that none explains is completed by a network,
+    which is asked at every node where the coarse ones around are not all `beyond_doubt`; its logit
+    is `crust_logit` at least for `crust` metres behind what is seen of it. Space is empty that lies
+    more than `carve_depth` in front of the measured depth, or `carve_plane` below the plane, or
+    less than `carve_behind` behind what is no object's and more than `carve_pixels` from the mask.
     """
 
     nodes: int = 200_000
@@ -183,6 +184,7 @@ class MeanConfig:
     sure: float = 0.9
     doubt: float = 0.02
     limit: float = 5.0
+    beyond_doubt: float = 1.5
     crust: float = 0.006
     crust_logit: float = 1.0
     carve_depth: float = 0.006

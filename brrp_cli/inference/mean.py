@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import binary_dilation, map_coordinates
+from scipy.ndimage import binary_dilation, map_coordinates, maximum_filter, minimum_filter
 
 from brrp_cli.completion.around import lengths
 from brrp_cli.completion.network import fitted
@@ -90,7 +90,8 @@ def completed_lattice(
     """Logits (nx, ny, nz) at nodes (nx, ny, nz, 3), metres, camera frame, of an object that is none
     of the stored ones; the least where it is empty.
 
-    The network is asked at every second node along each axis; between them its logits are linear.
+    The network is asked at every second node along each axis, and at the nodes between where those
+    around are neither all out of doubt (`beyond_doubt`) inside nor all outside.
     """
     near = binary_dilation(~empty, np.ones((3, 3, 3), bool))
     # One node more at the end where the last one would have none after it.
@@ -100,12 +101,22 @@ def completed_lattice(
         np.meshgrid(*steps, indexing="ij"), axis=-1
     )
     asked = np.full(odd.shape, -config.limit, np.float32)
-    asked[odd] = fitted().logits(lengths(at[odd], part))
+    asked[odd] = _network(at[odd], part)
+    doubtful = (maximum_filter(asked, 3) > -config.beyond_doubt) & (
+        minimum_filter(asked, 3) < config.beyond_doubt
+    )
     for axis, count in enumerate(empty.shape):
         asked = _doubled(asked, axis, count)
+        doubtful = doubtful.repeat(2, axis=axis).take(np.arange(count), axis=axis)
+    doubtful &= ~empty
+    asked[doubtful] = _network(nodes[doubtful], part)
     logits = np.full(empty.shape, -config.limit, np.float16)
     logits[~empty] = _with_crust(asked[~empty], nodes[~empty], part, config)
     return logits
+
+
+def _network(points: Array, part: SeenPart) -> Floats:
+    return fitted().logits(lengths(points, part)) if len(points) else np.empty(0, np.float32)
 
 
 def _doubled(values: Floats, axis: int, count: int) -> Floats:
