@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 import threading
 
 import numpy as np
@@ -46,3 +47,12 @@ def test_sums_have_the_same_bytes_on_any_number_of_threads():
 
     found = [list(in_threads(product, list(values), workers)) for workers in (1, 2, 4)]
     assert found[0] == found[1] == found[2]
+
+
+def test_turns_are_short_meanwhile_and_as_before_afterwards():
+    before = sys.getswitchinterval()
+    assert (
+        list(in_threads(lambda _: sys.getswitchinterval() < 1e-3 < before, range(4), 2))
+        == [True] * 4
+    )
+    assert sys.getswitchinterval() == before

@@ -22,6 +22,9 @@ from brrp_cli.registration.testimony import Testimony
 
 Array = NDArray[np.float64]
 
+# The first look at all starts takes one point of so many, and leaves so many times those that slide.
+GLANCE, GLANCED = 3, 2
+
 
 @dataclass(frozen=True)
 class Hypothesis:
@@ -59,7 +62,7 @@ def search(
     if testimony.plane is not None:
         starts += resting_starts(model, testimony.points, testimony.plane, config.turns)
     T = np.stack(starts)
-    T, _ = _best(T, model, testimony, config, 2 * config.coarse, share=3)
+    T, _ = _best(T, model, testimony, config, GLANCED * config.coarse, GLANCE)
     T, _ = _best(T, model, testimony, config, config.coarse)
     T = _slid(
         T, model, testimony, config.coarse_points, config.coarse_distance, config.coarse_steps

@@ -11,6 +11,7 @@ from brrp_cli.frames.frame import Frame
 from brrp_cli.geometry import transform_points
 from brrp_cli.methods.base import OK, TOO_FEW_POINTS
 from brrp_cli.methods.vprism import reconstruct_vprism
+from brrp_cli.surface.extract import lattice_axes
 
 # Boxes on the table z = 0 of the world: lower and upper corner, metres.
 BOXES = {
@@ -167,3 +168,16 @@ def test_updates_in_parts_come_close_to_one_update(frame, found):
     parted = {r.object_id: r for r in reconstruct_vprism(frame, config, seed=1)}[3].posterior
     one, parts = found[3].posterior.probability(points) > 0.5, parted.probability(points) > 0.5
     assert (one & parts).sum() / (one | parts).sum() > 0.9
+
+
+@pytest.mark.parametrize("object_id", BOXES)
+def test_a_lattice_is_that_of_its_points_where_it_counts(found, object_id):
+    posterior = found[object_id].posterior
+    axes = lattice_axes(posterior.bounds, 0.01)
+    volume = posterior.probability_volume(axes)
+    nodes = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
+    exact = posterior.probability(nodes.reshape(-1, 3)).reshape(volume.shape)
+    assert (exact > 0.5).sum() > 50
+    np.testing.assert_array_equal(volume > 0.5, exact > 0.5)
+    np.testing.assert_allclose(volume[exact > 0.1], exact[exact > 0.1], atol=1e-6)
+    assert (volume[exact < 0.02] < 0.1).all()
