@@ -22,7 +22,7 @@ from brrp_cli.registration.testimony import Testimony
 
 Array = NDArray[np.float64]
 
-# The first look at all starts takes one point of so many, and leaves so many times what slides then.
+# The first look at all starts takes one point of so many, and leaves so many times what slides.
 GLANCE, GLANCED = 3, 2
 
 
