@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from brrp_cli.errors import BrrpError
 
 if TYPE_CHECKING:
-    from brrp_cli.methods.base import ObjectReconstruction
+    from brrp_cli.reconstruction import ObjectReconstruction
 
 
 def check_finite(stage: str, **values: ArrayLike | None) -> None:

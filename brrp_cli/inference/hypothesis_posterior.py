@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from brrp_cli.inference.mean import MeanLattice
 from brrp_cli.inference.posterior import HilbertPosterior, mean_occupancy
-from brrp_cli.methods.base import METRES, Axes
+from brrp_cli.inference.prior_mean import MeanLattice
+from brrp_cli.reconstruction import METRES, Axes
 
 # Standard deviation of the logistic distribution over 4: a surface whose occupancy is a logistic
 # function of the way across it has this over the gradient as standard deviation of its place.

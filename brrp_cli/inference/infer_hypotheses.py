@@ -21,8 +21,8 @@ from brrp_cli.inference.density import logistic_score
 from brrp_cli.inference.hinge import HingeGrid, factors
 from brrp_cli.inference.hypothesis_posterior import HypothesisPosterior
 from brrp_cli.inference.infer import LabelledPoints
-from brrp_cli.inference.mean import MeanLattice
 from brrp_cli.inference.posterior import HilbertPosterior
+from brrp_cli.inference.prior_mean import MeanLattice
 from brrp_cli.inference.svgd import run_svgd
 from brrp_cli.seeds import child_seed
 

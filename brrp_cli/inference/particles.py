@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from brrp_cli.inference.hypothesis_posterior import HypothesisPosterior
 from brrp_cli.inference.posterior import HilbertPosterior
-from brrp_cli.methods.base import Axes, OccupancyPosterior
+from brrp_cli.reconstruction import Axes, OccupancyPosterior
 
 
 def particle_volumes(posterior: OccupancyPosterior, axes: Axes) -> NDArray[np.float32]:

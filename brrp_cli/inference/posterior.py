@@ -9,7 +9,7 @@ import torch
 from numpy.typing import NDArray
 
 from brrp_cli.inference.hinge import HingeGrid, factors, lattice_logits
-from brrp_cli.methods.base import LOGIT_VARIANCE, Axes
+from brrp_cli.reconstruction import LOGIT_VARIANCE, Axes
 
 # So many points at once: their products stay in the cache.
 CHUNK = 2_048

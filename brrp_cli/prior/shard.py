@@ -42,9 +42,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from brrp_cli.appearance.colour import COLOUR_BINS
-from brrp_cli.appearance.descriptor import Appearance
-from brrp_cli.appearance.pairs import PAIR_BINS
+from brrp_cli.descriptors.colour_histogram import COLOUR_BINS
+from brrp_cli.descriptors.descriptor import Appearance
+from brrp_cli.descriptors.point_pairs import PAIR_BINS
 from brrp_cli.errors import PriorError
 from brrp_cli.files import parse_json, write_bytes
 from brrp_cli.hdf5 import hdf5_bytes

@@ -14,15 +14,15 @@ from numpy.typing import NDArray
 from brrp_cli.config import Config
 from brrp_cli.errors import RetrievalError
 from brrp_cli.frames.frame import BACKGROUND, Frame
-from brrp_cli.frames.observe import box_center
-from brrp_cli.frames.plane import Plane, fit_plane
-from brrp_cli.prior.looks import Looks
+from brrp_cli.observation.ray_samples import box_center
+from brrp_cli.observation.support_plane import Plane, fit_plane
+from brrp_cli.prior.appearance_index import Looks
 from brrp_cli.prior.store import Prior
-from brrp_cli.retrieval.belief import Evidence, believe
-from brrp_cli.retrieval.lights import lights, local_lights, log_prior
-from brrp_cli.retrieval.likeness import evidence, lit_histograms
-from brrp_cli.retrieval.seen import see_object
+from brrp_cli.retrieval.illuminants import lights, local_lights, log_prior
+from brrp_cli.retrieval.observed_appearance import see_object
+from brrp_cli.retrieval.score_fusion import Evidence, believe
 from brrp_cli.retrieval.shortlist import Shortlist
+from brrp_cli.retrieval.similarity import evidence, lit_histograms
 
 
 def need_appearance(prior: Prior) -> Looks:

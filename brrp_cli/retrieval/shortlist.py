@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from brrp_cli.prior.looks import FirstLook
-from brrp_cli.retrieval.belief import NEUTRAL_COLOUR, WEIGHTS
-from brrp_cli.retrieval.likeness import size_penalty
-from brrp_cli.retrieval.seen import SeenObject
+from brrp_cli.prior.appearance_index import FirstLook
+from brrp_cli.retrieval.observed_appearance import SeenObject
+from brrp_cli.retrieval.score_fusion import NEUTRAL_COLOUR, WEIGHTS
+from brrp_cli.retrieval.similarity import size_penalty
 
 # Every object is looked at closely in a prior of this size or less.
 CLOSELY = 256

@@ -30,7 +30,7 @@ from numpy.typing import NDArray
 
 from brrp_cli.config import SurfaceConfig
 from brrp_cli.inference.particles import particle_volumes
-from brrp_cli.methods.base import Axes, OccupancyPosterior
+from brrp_cli.reconstruction import Axes, OccupancyPosterior
 from brrp_cli.surface.extract import lattice_axes, level_set
 
 # Which of points (n, 3), metres, camera frame, were seen to be empty: (n,) bool.

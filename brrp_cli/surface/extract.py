@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from brrp_cli.config import SurfaceConfig
 from brrp_cli.errors import BrrpError
 from brrp_cli.finite import check_finite
-from brrp_cli.methods.base import Axes, OccupancyPosterior, Surface
+from brrp_cli.reconstruction import Axes, OccupancyPosterior, Surface
 
 # How far, at least, the occupancy of what is inside lies above the level: 10 micrometres.
 _CLEAR = 1e-3

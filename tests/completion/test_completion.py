@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 from table_scene import TABLE, box, in_camera, photograph, placed
 
-from brrp_cli.completion.around import COUNT, lengths
 from brrp_cli.completion.network import Network, fitted, from_bytes
-from brrp_cli.completion.part import seen_part
+from brrp_cli.completion.point_features import COUNT, lengths
+from brrp_cli.completion.visible_part import seen_part
 from brrp_cli.config import CompletionConfig, MeanConfig
-from brrp_cli.frames.lookup import at_pixels, depth_behind
-from brrp_cli.frames.plane import Plane
+from brrp_cli.frames.projection import at_pixels, depth_behind
 from brrp_cli.geometry import transform_points
-from brrp_cli.inference.mean import MeanLattice, completed_lattice, empty_space, lattice_over
+from brrp_cli.inference.prior_mean import MeanLattice, completed_lattice, empty_space, lattice_over
+from brrp_cli.observation.support_plane import Plane
 from brrp_cli.shapes import solids
 
 CONFIG, MEAN = CompletionConfig(), MeanConfig()

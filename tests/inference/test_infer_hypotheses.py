@@ -10,7 +10,7 @@ import pytest
 from brrp_cli.config import FittedMapConfig, MeanConfig
 from brrp_cli.inference.infer import LabelledPoints
 from brrp_cli.inference.infer_hypotheses import Problem, box_grid, infer_correction, share_out
-from brrp_cli.inference.mean import MeanLattice, lattice_over, shape_logits
+from brrp_cli.inference.prior_mean import MeanLattice, lattice_over, shape_logits
 
 MEAN = replace(MeanConfig(), nodes=20_000)
 # Fewer hinge points than the preset has: the same code in a fraction of a second.

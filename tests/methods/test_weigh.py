@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from brrp_cli.config import WeighConfig
-from brrp_cli.methods.hypothesise import weigh
+from brrp_cli.methods.brrp_default import weigh
 
 CONFIG = WeighConfig()
 

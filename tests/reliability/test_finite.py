@@ -7,7 +7,7 @@ import pytest
 
 from brrp_cli import api
 from brrp_cli.config import Config
-from brrp_cli.methods.base import FAILED, OK, TOO_FEW_POINTS, ObjectReconstruction, Retrieved
+from brrp_cli.reconstruction import FAILED, OK, TOO_FEW_POINTS, ObjectReconstruction, Retrieved
 
 
 def inferred() -> ObjectReconstruction:

@@ -13,7 +13,7 @@ from hypothesis.extra import numpy as hnp
 
 from brrp_cli.config import SurfaceConfig
 from brrp_cli.errors import BrrpError
-from brrp_cli.methods.base import METRES
+from brrp_cli.reconstruction import METRES
 from brrp_cli.surface.extract import extract_surface
 
 SPACING = SurfaceConfig().spacing

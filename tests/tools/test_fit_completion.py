@@ -1,21 +1,14 @@
 """The network of completion is fitted by a command, on scenes."""
 
-import sys
-from pathlib import Path
-
 import numpy as np
 import pytest
 from click.testing import CliRunner
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "tools"))
-sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "evaluation"))
-
 from fit_completion import Examples, fit, look, main
 from tiny_scenes import write_meshes, write_scene
 
-from brrp_cli.completion.around import COUNT
 from brrp_cli.completion.network import from_bytes
-from brrp_cli.evaluation.scenes import find_scenes
+from brrp_cli.completion.point_features import COUNT
+from brrp_cli.ground_truth.scenes import find_scenes
 
 
 @pytest.fixture(scope="module")
