@@ -41,6 +41,6 @@ def check_object(item: ObjectReconstruction) -> None:
             T_cam_object=found.T_cam_object,
             scale=found.scale,
             fitness=found.fitness,
-            evidence=found.evidence,
+            alignment_score=found.alignment_score,
             weight=found.weight,
         )

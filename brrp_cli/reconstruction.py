@@ -37,7 +37,7 @@ class OccupancyPosterior(Protocol):
         """Occupancy probability (n,) at points (n, 3), metres, camera frame."""
 
     def probability_volume(self, axes: Axes) -> NDArray[np.float32]:
-        """Occupancy probability (nx, ny, nz) on a lattice of camera-frame coordinates, metres."""
+        """Occupancy probability (nx, ny, nz) on a grid of camera-frame coordinates, metres."""
 
     @property
     def surface_unit(self) -> str:
@@ -77,8 +77,8 @@ class Retrieved:
 
     T_cam_object maps the stored object's normalised coordinates to the camera frame (a
     similarity); None where registration found no inlier. fitness: share of observed points with
-    an inlier, 0 to 1. evidence : what the frame says for the best placement, 1 at best; weight : of
-    the object in the posterior; both None where placements are not verified.
+    an inlier, 0 to 1. alignment_score : what the frame says for the best placement, 1 at best;
+    weight : of the object in the posterior; both None where placements are not verified.
     """
 
     name: str
@@ -87,7 +87,7 @@ class Retrieved:
     scale: float | None = None
     inliers: int = 0
     fitness: float = 0.0
-    evidence: float | None = None
+    alignment_score: float | None = None
     weight: float | None = None
 
 

@@ -32,7 +32,7 @@ from brrp_cli.progress import progress
 from brrp_cli.retrieval.appearance import AppearanceRetriever
 from brrp_cli.retrieval.base import unknown
 from brrp_cli.retrieval.illuminants import lights, local_lights, log_prior
-from brrp_cli.retrieval.score_fusion import WEIGHTS, Evidence, Weights, believe
+from brrp_cli.retrieval.score_fusion import WEIGHTS, Similarity, Weights, believe
 
 LARGE = 500  # visible pixels
 
@@ -42,7 +42,7 @@ class View:
     """What one view shows: evidence, visible pixels and the true row (-1: not in the prior)."""
 
     group: str
-    evidence: list[Evidence]
+    evidence: list[Similarity]
     pixels: list[int]
     truth: list[int]
 

@@ -1,7 +1,7 @@
-"""What is known at a point from where it lies to the seen part of an object: a few lengths.
+"""What is known at a point from where it lies to the seen part of an object: a few features.
 
 No length says by itself whether a point is inside. Together they do, and the same way for all kinds
-of objects: a point as far behind the seen surface as that is from the outline, say, is mostly
+of objects: a point as far behind the seen surface as that is from the silhouette, say, is mostly
 inside. network.py weighs them.
 """
 
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from brrp_cli.completion.convex_hull import outside_hull
-from brrp_cli.completion.visible_part import LEAST, MOST, SeenPart
+from brrp_cli.completion.visible_part import LEAST, MOST, VisiblePart
 from brrp_cli.frames.frame import BACKGROUND
 from brrp_cli.frames.projection import at_pixels, depth_behind
 from brrp_cli.geometry import transform_points
@@ -20,7 +20,7 @@ from brrp_cli.geometry import transform_points
 Array = NDArray[np.float64]
 Features = NDArray[np.float32]
 
-# Lengths beyond these tell nothing more, metres; ratios of lengths likewise.
+# Lengths beyond these tell nothing more, metres; ratios likewise.
 FAR = 0.2
 RATIO = 4.0
 # Metres, added to what a length is divided by that may be 0.
@@ -29,7 +29,7 @@ THIN = 0.002
 COUNT, WHOLE = 52, 6
 
 
-def lengths(points: Array, part: SeenPart) -> Features:
+def point_features(points: Array, part: VisiblePart) -> Features:
     """(n, `COUNT`) of points (n, 3), metres, camera frame. Lengths stand in tenths of `FAR` and in
     the object's sizes; without a plane, heights count as in the middle of the object."""
     frame, size = part.frame, part.size
@@ -39,20 +39,20 @@ def lengths(points: Array, part: SeenPart) -> Features:
     ground = label == BACKGROUND
     # From pixels to metres at the point's own depth.
     pixel = np.maximum(points[:, 2], 0) / frame.K[0, 0]
-    outline = np.nan_to_num(at_pixels(points, part.outline, frame)) * pixel
-    limb = np.nan_to_num(at_pixels(points, part.limbs, frame)) * pixel
+    silhouette = np.nan_to_num(at_pixels(points, part.silhouette, frame)) * pixel
+    local_thickness = np.nan_to_num(at_pixels(points, part.limbs, frame)) * pixel
 
     outside = outside_hull(points, part.facets)
     away, nearest = cKDTree(part.seen).query(points)
-    if part.plane is None or part.roof is None:
+    if part.plane is None or part.height_map is None:
         height = np.full(len(points), part.top)
-        over_roof = np.full(len(points), -part.top)
+        over_map = np.full(len(points), -part.top)
         beside = away
         lower = np.zeros(len(points))
     else:
         height = part.plane.signed_distance(points)
-        over_roof = part.roof.above(points)
-        T = part.roof.T_plane_cam
+        over_map = part.height_map.above(points)
+        T = part.height_map.T_plane_cam
         beside, _ = cKDTree(transform_points(T, part.seen)[:, :2]).query(
             transform_points(T, points)[:, :2]
         )
@@ -69,15 +69,15 @@ def lengths(points: Array, part: SeenPart) -> Features:
         away,
         beside,
         behind,
-        outline,
+        silhouette,
         height,
-        over_roof,
+        over_map,
         lower,
         part.depths[nearest],
         np.abs(across),
         ahead,
         round_,
-        limb,
+        local_thickness,
         along,
     ]
     # Most things are the same from behind, or left and right.
@@ -99,10 +99,10 @@ def lengths(points: Array, part: SeenPart) -> Features:
     columns += [
         own,
         ground,
-        np.clip(behind / (outline + THIN), -RATIO, RATIO),
+        np.clip(behind / (silhouette + THIN), -RATIO, RATIO),
         np.clip(height / max(part.top, LEAST), -1, RATIO),
         np.clip(round_ / center, 0, RATIO),
-        np.clip(behind / (limb + THIN), -RATIO, RATIO),
+        np.clip(behind / (local_thickness + THIN), -RATIO, RATIO),
         part.normals[nearest] @ part.ahead,
         np.abs(part.normals[nearest] @ part.across),
         part.normals[nearest] @ part.up,
@@ -111,11 +111,13 @@ def lengths(points: Array, part: SeenPart) -> Features:
     return np.stack(columns, axis=1).astype(np.float32)
 
 
-def _mirrored(points: Array, twice: Array, direction: Array, part: SeenPart) -> list[Array]:
+def _mirrored(points: Array, twice: Array, direction: Array, part: VisiblePart) -> list[Array]:
     """Where each point's image lies, `twice` its distance from the mirror back along the unit
-    `direction`: behind what is seen, within the outline, over the roof."""
+    `direction`: behind what is seen, within the silhouette, over the height_map."""
     image = points - twice[:, None] * direction
     behind = np.clip(np.nan_to_num(-depth_behind(image, part.frame)), -FAR, FAR)
-    outline = np.nan_to_num(at_pixels(image, part.outline, part.frame))
-    over = np.full(len(points), -part.top) if part.roof is None else part.roof.above(image)
-    return [behind, outline * np.maximum(image[:, 2], 0) / part.frame.K[0, 0], over]
+    silhouette = np.nan_to_num(at_pixels(image, part.silhouette, part.frame))
+    over = (
+        np.full(len(points), -part.top) if part.height_map is None else part.height_map.above(image)
+    )
+    return [behind, silhouette * np.maximum(image[:, 2], 0) / part.frame.K[0, 0], over]

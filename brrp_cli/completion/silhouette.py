@@ -1,4 +1,4 @@
-"""What an object's outline in the image says: how far within it a pixel lies, and how thick the
+"""What an object's silhouette in the image says: how far within it a pixel lies, and how thick the
 part of the object is that the pixel shows."""
 
 from __future__ import annotations
@@ -15,30 +15,31 @@ Image = NDArray[np.float32]
 WIDTHS = 12
 
 
-def outlines(frame: Frame, object_id: int) -> tuple[Image, Image]:
-    """`within_outline` and `limb_width` (H, W) where the object is or may go on, 0 elsewhere."""
+def silhouettes(frame: Frame, object_id: int) -> tuple[Image, Image]:
+    """`within_silhouette` and `local_thickness` (H, W) where the object is or may
+    go on, 0 elsewhere."""
     rows, columns = np.nonzero(frame.segmap == object_id)
     margin = int(np.ptp(rows) + np.ptp(columns)) // 4 + 2
     window = tuple(
         slice(max(0, int(each.min()) - margin), int(each.max()) + margin + 1)
         for each in (rows, columns)
     )
-    outline, limbs = np.zeros((2, *frame.shape), dtype=np.float32)
-    outline[window] = within_outline(frame.segmap[window])
-    limbs[window] = limb_width(outline[window])
-    return outline, limbs
+    silhouette, limbs = np.zeros((2, *frame.shape), dtype=np.float32)
+    silhouette[window] = within_silhouette(frame.segmap[window])
+    limbs[window] = local_thickness(silhouette[window])
+    return silhouette, limbs
 
 
-def within_outline(segmap: NDArray[np.integer]) -> Image:
+def within_silhouette(segmap: NDArray[np.integer]) -> Image:
     """(H, W) pixels from each pixel to the nearest of the background, or of the image's edge; what
     another object hides may go on."""
     ground = np.pad(segmap == BACKGROUND, 1, constant_values=True)
     return distance_transform_edt(~ground)[1:-1, 1:-1].astype(np.float32)
 
 
-def limb_width(within: Image) -> Image:
-    """(H, W) pixels, the radius of the largest disc within the outline that has the pixel in it: of
-    a handle or a stalk it is small, however large the object."""
+def local_thickness(within: Image) -> Image:
+    """(H, W) pixels, the radius of the largest disc within the silhouette that has the pixel in
+    it: of a handle or a stalk it is small, however large the object."""
     width = within.copy()
     top = float(within.max())
     for radius in np.geomspace(2, top, WIDTHS) if top > 2 else ():

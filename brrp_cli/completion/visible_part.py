@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from brrp_cli.completion.convex_hull import hull_facets, outside_hull
-from brrp_cli.completion.height_map import Roof, roof_over
-from brrp_cli.completion.silhouette import Image, outlines
+from brrp_cli.completion.height_map import HeightMap, height_map_over
+from brrp_cli.completion.silhouette import Image, silhouettes
 from brrp_cli.config import CompletionConfig
 from brrp_cli.frames.frame import Frame
 from brrp_cli.geometry import normalise
@@ -30,17 +30,18 @@ NEIGHBOURS = 12
 
 
 @dataclass(frozen=True)
-class SeenPart:
+class VisiblePart:
     """Metres, camera frame.
 
     seen : (n, 3) observed points, thinned; feet : (m, 3) theirs on the plane, none without one
-    facets : (f, 4) of the hull of both, outward unit normal and offset; roof : None without a plane
+    facets : (f, 4) of the hull of both, outward unit normal and offset
+    height_map : None without a plane
     size : diagonal of the box of the seen points; top : the height of the highest over the plane
     ahead, across : (3,) unit directions along the plane, away from the camera and across; front,
     back : where the seen points begin and end ahead; middle, width : of them across
     depths : (n,) how deep the seen points lie in the hull: much of a cup's inside does
     normals : (n, 3) of the seen points, unit, towards the camera
-    outline, limbs : (H, W) pixels, of outline.py
+    silhouette, limbs : (H, W) pixels, of silhouette.py
     """
 
     frame: Frame
@@ -49,7 +50,7 @@ class SeenPart:
     seen: Array
     feet: Array
     facets: Array
-    roof: Roof | None
+    height_map: HeightMap | None
     size: float
     top: float
     ahead: Array
@@ -60,7 +61,7 @@ class SeenPart:
     width: float
     depths: Array
     normals: Array
-    outline: Image
+    silhouette: Image
     limbs: Image
 
     @property
@@ -74,40 +75,40 @@ class SeenPart:
         return np.concatenate([self.seen, self.feet])
 
 
-def seen_part(
+def visible_part(
     points: NDArray[np.floating],
     frame: Frame,
     object_id: int,
     plane: Plane | None,
     config: CompletionConfig,
-) -> SeenPart:
+) -> VisiblePart:
     """From an object's observed points (n, 3), metres, camera frame, and its support plane."""
     seen = grid_subsample(points, config.cell).astype(np.float64)
     low, high = np.quantile(seen, MOST, axis=0)
     size = max(float(np.linalg.norm(high - low)), LEAST)
     up = UPRIGHT if plane is None else plane.normal
     if plane is None:
-        feet, roof, top = np.zeros((0, 3)), None, size / 2
+        feet, height_map, top = np.zeros((0, 3)), None, size / 2
     else:
         height = np.maximum(plane.signed_distance(seen), 0.0)
         feet = seen - height[:, None] * up
-        roof = roof_over(points, plane, config)
+        height_map = height_map_over(points, plane, config)
         top = float(np.quantile(height, MOST[1]))
-    outline, limbs = outlines(frame, object_id)
+    silhouette, limbs = silhouettes(frame, object_id)
     facets = hull_facets(np.concatenate([seen, feet]))
     sight = seen.mean(axis=0)
     across = normalise(np.cross(up, sight))
     ahead = np.cross(across, up)
     front, back = np.quantile(seen @ ahead, MOST)
     left, right = np.quantile(seen @ across, MOST)
-    return SeenPart(
+    return VisiblePart(
         frame=frame,
         object_id=object_id,
         plane=plane,
         seen=seen,
         feet=feet,
         facets=facets,
-        roof=roof,
+        height_map=height_map,
         size=size,
         top=top,
         ahead=ahead,
@@ -118,7 +119,7 @@ def seen_part(
         width=max(float(right - left), LEAST),
         depths=-outside_hull(seen, facets),
         normals=surface_normals(seen),
-        outline=outline,
+        silhouette=silhouette,
         limbs=limbs,
     )
 

@@ -37,7 +37,7 @@ class TrueShape:
     closed, exact : occupancy (27^3,) at `grid` (27^3, 3), whose axes are the world's; by the mesh
         that the published tables would use and by the one that is not thickened
     T_cam_grid : (4, 4), from indices of the published grid to the camera frame
-    fine_exact : (81, 81, 81) occupancy on the lattice `fine`, along the camera's axes
+    fine_exact : (81, 81, 81) occupancy on the grid `fine`, along the camera's axes
     closed_surface, exact_surface : (8000, 3) points of the two surfaces
     near : (n, 3) points of a 1 cm grid in the true bounding box, grown by 5 cm; near_exact : (n,)
         their occupancy; occluded : (n,) which of them lie behind what the camera saw

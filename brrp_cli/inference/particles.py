@@ -12,7 +12,7 @@ from brrp_cli.reconstruction import Axes, OccupancyPosterior
 
 
 def particle_volumes(posterior: OccupancyPosterior, axes: Axes) -> NDArray[np.float32]:
-    """Occupancy probability (P, nx, ny, nz) of each particle on a lattice of camera-frame
+    """Occupancy probability (P, nx, ny, nz) of each particle on a grid of camera-frame
     coordinates, metres; their mean over P is `posterior.probability_volume(axes)`.
 
     V-PRISM and PointSDF have no particles: P is 1, and that is the mean.

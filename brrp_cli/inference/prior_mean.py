@@ -2,7 +2,7 @@
 
 A hypothesis about an object is a logit of occupancy m(x). With it the map is
 sigmoid(m(x) + w . phi(x)): the weights are left with what the hypothesis does not explain, and a
-thin wall needs no hinge points of its own. Each m is kept on a lattice in the camera frame.
+thin wall needs no hinge points of its own. Each m is kept on a grid in the camera frame.
 """
 
 from __future__ import annotations
@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from scipy.ndimage import binary_dilation, map_coordinates, maximum_filter, minimum_filter
 
 from brrp_cli.completion.network import fitted
-from brrp_cli.completion.point_features import lengths
-from brrp_cli.completion.visible_part import SeenPart
+from brrp_cli.completion.point_features import point_features
+from brrp_cli.completion.visible_part import VisiblePart
 from brrp_cli.config import MeanConfig
 from brrp_cli.frames.frame import BACKGROUND, Frame
 from brrp_cli.frames.projection import at_pixels, depth_behind
@@ -26,14 +26,14 @@ Array = NDArray[np.float64]
 Floats = NDArray[np.float32]
 
 # Metres before the measured depth that still count as the seen surface.
-CRUST_BEFORE = 0.001
+SHELL_BEFORE = 0.001
 
 
 @dataclass(frozen=True)
-class MeanLattice:
+class PriorMeanGrid:
     """Logits at the nodes lower + spacing * (i, j, k), metres, camera frame, of C hypotheses.
 
-    lower : (3,); spacing : > 0; values : (C, nx, ny, nz) float16; outside : logit off the lattice
+    lower : (3,); spacing : > 0; values : (C, nx, ny, nz) float16; outside : logit off the grid
     """
 
     lower: Array
@@ -59,14 +59,14 @@ class MeanLattice:
         )
 
     def volume(self, axes: Axes) -> NDArray[np.float32]:
-        """(C, nx, ny, nz) on another lattice along the camera's axes."""
+        """(C, nx, ny, nz) on another grid along the camera's axes."""
         nodes = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
         found = self.logits(nodes.reshape(-1, 3))
         return found.reshape(-1, *nodes.shape[:3])
 
 
-def lattice_over(box: Array, config: MeanConfig) -> tuple[Array, float, Array]:
-    """Lower node (3,), spacing and nodes (nx, ny, nz, 3) of a lattice over a box (2, 3) with about
+def grid_over(box: Array, config: MeanConfig) -> tuple[Array, float, Array]:
+    """Lower node (3,), spacing and nodes (nx, ny, nz, 3) of a grid over a box (2, 3) with about
     `config.nodes` nodes."""
     spacing = float((np.prod(box[1] - box[0]) / config.nodes) ** (1 / 3))
     shape = np.ceil((box[1] - box[0]) / spacing).astype(np.int64) + 1
@@ -74,18 +74,18 @@ def lattice_over(box: Array, config: MeanConfig) -> tuple[Array, float, Array]:
     return box[0].copy(), spacing, np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
 
 
-def shape_logits(distance: Array, evidence: float, config: MeanConfig) -> Array:
+def shape_logits(distance: Array, alignment_score: float, config: MeanConfig) -> Array:
     """Logits of a placed shape, from signed distances, metres: -(d - growth) / width, limited.
 
     The less the frame says for the placement, the softer its surface.
     """
-    width = config.width + config.doubt * max(0.0, config.sure - evidence)
+    width = config.width + config.doubt * max(0.0, config.sure - alignment_score)
     logits = np.clip((config.growth - distance) / width, -config.limit, config.limit)
     return np.asarray(logits)
 
 
-def completed_lattice(
-    nodes: Array, empty: NDArray[np.bool_], part: SeenPart, config: MeanConfig
+def completed_grid(
+    nodes: Array, empty: NDArray[np.bool_], part: VisiblePart, config: MeanConfig
 ) -> NDArray[np.float16]:
     """Logits (nx, ny, nz) at nodes (nx, ny, nz, 3), metres, camera frame, of an object that is none
     of the stored ones; the least where it is empty.
@@ -115,8 +115,8 @@ def completed_lattice(
     return logits
 
 
-def _network(points: Array, part: SeenPart) -> Floats:
-    return fitted().logits(lengths(points, part)) if len(points) else np.empty(0, np.float32)
+def _network(points: Array, part: VisiblePart) -> Floats:
+    return fitted().logits(point_features(points, part)) if len(points) else np.empty(0, np.float32)
 
 
 def _doubled(values: Floats, axis: int, count: int) -> Floats:
@@ -128,14 +128,14 @@ def _doubled(values: Floats, axis: int, count: int) -> Floats:
     return np.moveaxis(found[:count], 0, axis)
 
 
-def _with_crust(logits: Floats, points: Array, part: SeenPart, config: MeanConfig) -> Array:
+def _with_crust(logits: Floats, points: Array, part: VisiblePart, config: MeanConfig) -> Array:
     """The network's logits (n,) at points (n, 3), limited. What was seen has some thickness,
     however thin the walls are that the network thinks of."""
     limited = np.clip(logits, -config.limit, config.limit)
     behind = -depth_behind(points, part.frame)
     own = at_pixels(points, part.frame.segmap, part.frame) == part.object_id
-    crust = own & (np.nan_to_num(behind, nan=np.inf) < config.crust) & (behind > -CRUST_BEFORE)
-    return np.where(crust, np.maximum(limited, config.crust_logit), limited)
+    shell = own & (np.nan_to_num(behind, nan=np.inf) < config.shell) & (behind > -SHELL_BEFORE)
+    return np.where(shell, np.maximum(limited, config.shell_logit), limited)
 
 
 def empty_space(

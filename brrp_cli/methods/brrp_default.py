@@ -7,18 +7,18 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from brrp_cli.completion.visible_part import seen_part
+from brrp_cli.completion.visible_part import visible_part
 from brrp_cli.config import Config, HypothesesConfig, MeanConfig, WeighConfig
 from brrp_cli.frames.frame import Frame
 from brrp_cli.geometry import transform_points
 from brrp_cli.inference.hypothesis_posterior import HypothesisPosterior
 from brrp_cli.inference.infer import LabelledPoints
-from brrp_cli.inference.infer_hypotheses import Problem, infer_correction, share_out
+from brrp_cli.inference.infer_hypotheses import Problem, infer_correction, systematic_resampling
 from brrp_cli.inference.prior_mean import (
-    MeanLattice,
-    completed_lattice,
+    PriorMeanGrid,
+    completed_grid,
     empty_space,
-    lattice_over,
+    grid_over,
     shape_logits,
 )
 from brrp_cli.methods.check_prior import no_distances
@@ -29,7 +29,7 @@ from brrp_cli.reconstruction import OK, ObjectReconstruction, Retrieved
 from brrp_cli.registration.model import search_model
 from brrp_cli.registration.pose_search import Hypothesis, search
 from brrp_cli.registration.scale_scan import observed_cloud
-from brrp_cli.registration.verification import Testimony
+from brrp_cli.registration.verification import Verifier
 from brrp_cli.retrieval.base import Retriever, top_k, unknown
 from brrp_cli.seeds import child_rng, child_seed
 from brrp_cli.timing import timed
@@ -59,7 +59,7 @@ def reconstruct_by_hypotheses(
         chosen = top_k(probabilities, prior.names, config.k)
         missing = unknown(probabilities)
     with timed(seconds, "registration"):
-        testimony = Testimony(_shuffled(observation.points, seed, object_id), frame, plane)
+        verifier = Verifier(_shuffled(observation.points, seed, object_id), frame, plane)
         observed = observed_cloud(observation.points, config.features)
         found: list[list[Hypothesis]] = []
         for name, _ in chosen:
@@ -67,17 +67,21 @@ def reconstruct_by_hypotheses(
                 search(
                     search_model(prior.load(name)),
                     observed,
-                    testimony,
+                    verifier,
                     config.features,
                     hypotheses.search,
                     child_seed(seed, object_id),
-                    max((each.evidence for group in found for each in group), default=-np.inf),
+                    max(
+                        (each.alignment_score for group in found for each in group), default=-np.inf
+                    ),
                 )
             )
     with timed(seconds, "inference"):
         placed = [each for group in found for each in group]
         shares = [p for (_, p), group in zip(chosen, found, strict=True) for _ in group]
-        weights = weigh(shares, [each.evidence for each in placed], missing, hypotheses.weigh)
+        weights = weigh(
+            shares, [each.alignment_score for each in placed], missing, hypotheses.weigh
+        )
         posterior = _infer(
             observation, frame, plane, placed, weights, hypotheses, seed=seed, device=device
         )
@@ -102,7 +106,7 @@ def reconstruct_by_hypotheses(
 
 
 def weigh(
-    shares: Sequence[float], evidence: Sequence[float], missing: float, config: WeighConfig
+    shares: Sequence[float], alignment_score: Sequence[float], missing: float, config: WeighConfig
 ) -> Array:
     """Weights (C + 1,), sum 1, of C hypotheses and, last, of the one that it is something else.
 
@@ -111,11 +115,11 @@ def weigh(
     none = float(np.clip(missing, config.least_unknown, config.most_unknown))
     known = np.asarray(shares, dtype=np.float64)
     # Ratios among the stored objects are the retriever's, how likely they are as a whole is not:
-    # evidence that stands above all doubt outweighs a retriever that was wrong.
+    # alignment score that stands above all doubt outweighs a retriever that was wrong.
     if not known.any():
         known = np.ones_like(known)
     probability = np.append(known / (known.sum() or 1.0) * (1 - none), none)
-    scores = np.append(np.asarray(evidence, dtype=np.float64), config.unknown_evidence)
+    scores = np.append(np.asarray(alignment_score, dtype=np.float64), config.unknown_score)
     log = np.log(np.maximum(probability, config.least_share)) + config.sharpness * scores
     weights = np.exp(log - log.max())
     return np.asarray(weights / weights.sum())
@@ -133,10 +137,14 @@ def _infer(
     device: str,
 ) -> HypothesisPosterior:
     """Only hypotheses that a particle gets cost a mean function."""
-    kept, which = np.unique(share_out(weights, config.map.particles), return_inverse=True)
+    kept, which = np.unique(
+        systematic_resampling(weights, config.map.particles), return_inverse=True
+    )
     part = None
     if len(placed) in kept:
-        part = seen_part(observation.points, frame, observation.object_id, plane, config.completion)
+        part = visible_part(
+            observation.points, frame, observation.object_id, plane, config.completion
+        )
     extent = np.concatenate(
         [observation.points]
         + [_surface(placed[i]) for i in kept if i < len(placed)]
@@ -144,31 +152,31 @@ def _infer(
     )
     margin = config.map.margin
     box = np.stack([extent.min(axis=0) - margin, extent.max(axis=0) + margin])
-    lower, spacing, nodes = lattice_over(box, config.mean)
+    lower, spacing, nodes = grid_over(box, config.mean)
     empty = empty_space(nodes.reshape(-1, 3), frame, observation.object_id, plane, config.mean)
     empty = empty.reshape(nodes.shape[:3])
     mean = [
-        completed_lattice(nodes, empty, part, config.mean)
+        completed_grid(nodes, empty, part, config.mean)
         if part is not None and i == len(placed)
-        else _placed_lattice(nodes, empty, placed[i], config.mean)
+        else _placed_grid(nodes, empty, placed[i], config.mean)
         for i in kept
     ]
-    lattice = MeanLattice(lower, spacing, np.stack(mean), outside=-config.mean.limit)
+    grid = PriorMeanGrid(lower, spacing, np.stack(mean), outside=-config.mean.limit)
     return infer_correction(
-        Problem(LabelledPoints(observation.samples, observation.labels), lattice, which, box),
+        Problem(LabelledPoints(observation.samples, observation.labels), grid, which, box),
         config.map,
         seed=child_seed(seed, observation.object_id),
         device=device,
     )
 
 
-def _placed_lattice(
+def _placed_grid(
     nodes: Array, empty: NDArray[np.bool_], hypothesis: Hypothesis, config: MeanConfig
 ) -> NDArray[np.float16]:
     """Logits (nx, ny, nz) of a placed shape at nodes (nx, ny, nz, 3), but where it is empty."""
     logits = np.full(empty.shape, -config.limit, np.float16)
     distance = _distance(hypothesis, nodes[~empty])
-    logits[~empty] = shape_logits(distance, hypothesis.evidence, config)
+    logits[~empty] = shape_logits(distance, hypothesis.alignment_score, config)
     return logits
 
 
@@ -202,6 +210,6 @@ def _retrieved(name: str, probability: float, group: list[Hypothesis], weight: f
         probability,
         best.T_cam_object,
         best.scale,
-        evidence=best.evidence,
+        alignment_score=best.alignment_score,
         weight=weight,
     )

@@ -1,4 +1,4 @@
-"""A whole lattice of occupancy, of which only what is likely is asked node by node."""
+"""A whole grid of occupancy, of which only what is likely is asked node by node."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from brrp_cli.reconstruction import Axes
 
-# A lattice is asked at every third node first, and at all nodes only where one of the corners
+# A grid is asked at every third node first, and at all nodes only where one of the corners
 # around is likelier than this to be occupied.
 COARSE = 3
 EMPTY = 0.02
@@ -17,8 +17,8 @@ EMPTY = 0.02
 Probability = Callable[[NDArray[np.floating]], NDArray[np.float32]]
 
 
-def likely_lattice(probability: Probability, axes: Axes) -> NDArray[np.float32]:
-    """`probability` (n,) of points (n, 3) on a lattice (nx, ny, nz) of camera-frame coordinates,
+def coarse_to_fine_volume(probability: Probability, axes: Axes) -> NDArray[np.float32]:
+    """`probability` (n,) of points (n, 3) on a grid (nx, ny, nz) of camera-frame coordinates,
     metres.
 
     Where it is under `EMPTY` all around, values lie between those of every third node.

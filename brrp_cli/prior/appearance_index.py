@@ -42,7 +42,7 @@ log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
-class FirstLook:
+class AppearanceSummary:
     """The arrays of the file, see above; row i is that of object i."""
 
     colour: NDArray[np.uint8]
@@ -51,37 +51,39 @@ class FirstLook:
     crc32: NDArray[np.uint32]
 
 
-_NAMES = tuple(field.name for field in fields(FirstLook))
+_NAMES = tuple(field.name for field in fields(AppearanceSummary))
 
 
 @dataclass(frozen=True)
-class Looks:
+class AppearanceIndex:
     """first : of all objects; rows : structured rows (m,) with `colour` (v, COLOUR_BINS), `pairs`
     (v, PAIR_BINS) and `sizes` (r, 3) of the objects (m,) that are asked for."""
 
-    first: FirstLook
+    first: AppearanceSummary
     rows: Callable[[NDArray[np.int64]], NDArray[Any]]
 
     def __len__(self) -> int:
         return len(self.first.colour)
 
 
-def looks_of(table: NDArray[Any]) -> Looks:
+def looks_of(table: NDArray[Any]) -> AppearanceIndex:
     """Of descriptors (n,) that are at hand."""
-    return Looks(first_look(table), lambda rows: np.asarray(table[rows]))
+    return AppearanceIndex(first_look(table), lambda rows: np.asarray(table[rows]))
 
 
-def first_look(table: NDArray[Any]) -> FirstLook:
+def first_look(table: NDArray[Any]) -> AppearanceSummary:
     """Of descriptors (n,)."""
     parts = [
         (_mean_roots(rows["colour"]), _mean_roots(rows["pairs"]), rows["sizes"], _crc32(rows))
         for rows in (table[start : start + _CHUNK] for start in range(0, len(table), _CHUNK))
     ]
-    return FirstLook(*(np.concatenate(column) for column in zip(*parts, strict=True)))
+    return AppearanceSummary(*(np.concatenate(column) for column in zip(*parts, strict=True)))
 
 
-def open_looks(folder: Path, index: Index, manifest: Callable[[], Manifest]) -> Looks | None:
-    """The appearance of a prior's objects; None in a prior of an older brrp.
+def open_appearance_index(
+    folder: Path, index: Index, manifest: Callable[[], Manifest]
+) -> AppearanceIndex | None:
+    """The appearance of a prior's objects; None where colours cannot be read.
 
     manifest : asked for only where descriptors have to be made again from the shards. Errors:
     PriorError.
@@ -99,7 +101,7 @@ def open_looks(folder: Path, index: Index, manifest: Callable[[], Manifest]) -> 
         first = first_look(table)
         _write(folder, entry, first)
     rows.crc32 = first.crc32
-    return Looks(first, rows)
+    return AppearanceIndex(first, rows)
 
 
 @dataclass
@@ -144,13 +146,13 @@ def _path(folder: Path, entry: ShardEntry) -> Path:
     return (folder / entry.file).with_suffix(".npz")
 
 
-def _read(folder: Path, entry: ShardEntry, rows: _Rows) -> FirstLook | None:
+def _read(folder: Path, entry: ShardEntry, rows: _Rows) -> AppearanceSummary | None:
     """What the file says, if it is whole and of these descriptors."""
     try:
         # Larger than a frame may be, in a large prior, but never larger than the rows.
         limit = max(MAX_BYTES, entry.bytes)
         arrays, _ = read_npz(_path(folder, entry), frozenset({*_NAMES, "appearance"}), limit)
-        first = FirstLook(**{name: arrays[name] for name in _NAMES})
+        first = AppearanceSummary(**{name: arrays[name] for name in _NAMES})
         digest = str(arrays["appearance"])
     except (BrrpError, KeyError):
         return None
@@ -163,7 +165,7 @@ def _read(folder: Path, entry: ShardEntry, rows: _Rows) -> FirstLook | None:
     return first if fits and digest == entry.sha256 else None
 
 
-def _write(folder: Path, entry: ShardEntry, first: FirstLook) -> None:
+def _write(folder: Path, entry: ShardEntry, first: AppearanceSummary) -> None:
     """Keep it, unless the folder cannot be written: nothing but time is lost then."""
     path = _path(folder, entry)
     try:

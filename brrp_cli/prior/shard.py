@@ -17,7 +17,7 @@
         appearance/colour   (v, COLOUR_BINS) u1  square roots of histograms, 255 = 1; 0: no colours
         appearance/pairs    (v, PAIR_BINS)   u1  likewise
         appearance/sizes    (r, 3)  f4  metres: height, footprint in each resting pose
-        distances/lower     (3,)    f8  normalised: the first node of a lattice of signed distances
+        distances/lower     (3,)    f8  normalised: the first node of a grid of signed distances
         distances/spacing   (1,)    f8
         distances/values    (a, b, c) f2  negative inside
 
@@ -213,7 +213,7 @@ def read_stored(file: h5py.File, name: str) -> StoredObject:
     if DISTANCES in group and not (
         arrays[f"{DISTANCES}/spacing"][0] > 0 and min(arrays[f"{DISTANCES}/values"].shape) > 1
     ):
-        raise damaged(where, "distances without a lattice")
+        raise damaged(where, "distances without a grid")
     if starts[0] != 0 or starts[-1] != reading.lengths["p"] or (np.diff(starts) < 0).any():
         raise damaged(where, "clouds that overlap")
     return StoredObject(name, str(group.attrs["input_sha256"]), arrays, record)

@@ -13,7 +13,7 @@ from typing import Any
 from brrp_cli.errors import BrrpError, PriorError
 from brrp_cli.files import sha256_file
 from brrp_cli.prior.appearance_file import is_whole
-from brrp_cli.prior.appearance_index import Looks, open_looks
+from brrp_cli.prior.appearance_index import AppearanceIndex, open_appearance_index
 from brrp_cli.prior.index import Index, read_index
 from brrp_cli.prior.manifest import (
     FILE,
@@ -80,10 +80,10 @@ class Prior:
         return self.index.parameters
 
     @cached_property
-    def appearance(self) -> Looks | None:
+    def appearance(self) -> AppearanceIndex | None:
         """What the objects look like, a row for each name (see looks.py); None in a prior of an
         older brrp. Errors: PriorError."""
-        return open_looks(self.path, self.index, lambda: self.manifest)
+        return open_appearance_index(self.path, self.index, lambda: self.manifest)
 
     @property
     def digest(self) -> str:

@@ -18,7 +18,7 @@ Array = NDArray[np.float64]
 CHUNK = 64
 
 
-def drawn_motions(
+def ransac_motions(
     source: Array, target: Array, config: RegistrationConfig, count: int, rng: np.random.Generator
 ) -> list[Array]:
     """Rigid T_target_source (4, 4) with most inliers of `config.iterations` draws, `count` times

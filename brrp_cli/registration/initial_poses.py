@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from brrp_cli.config import FeatureConfig, RegistrationConfig
 from brrp_cli.geometry import normalise, similarity, transform_points
 from brrp_cli.observation.support_plane import Plane, plane_frame
-from brrp_cli.registration.batched_ransac import drawn_motions
+from brrp_cli.registration.batched_ransac import ransac_motions
 from brrp_cli.registration.model import COARSE, Model
 from brrp_cli.registration.ransac import match_pairs
 from brrp_cli.registration.scale_scan import ObservedCloud
@@ -28,7 +28,7 @@ SEEN = 600
 HIDDEN = 0.015
 
 
-def resting_starts(model: Model, points: Array, plane: Plane, turns: int) -> list[Array]:
+def resting_initial_poses(model: Model, points: Array, plane: Plane, turns: int) -> list[Array]:
     """T_cam_model (4, 4) of the model in each resting pose, turned about the plane's normal.
 
     points : (n, 3) observed, metres, camera frame, in random order. Along the plane, the box of
@@ -103,7 +103,7 @@ def _reach(
     return low + shift, high + shift
 
 
-def matched_starts(
+def feature_matched_poses(
     model: Model,
     observed: ObservedCloud,
     features: FeatureConfig,
@@ -125,7 +125,7 @@ def matched_starts(
     cloud = stored.clouds[nearest]
     pairs = match_pairs(cloud, observed.cloud)
     rng = child_rng(seed, "starts", stored.name)
-    found = drawn_motions(
+    found = ransac_motions(
         cloud.points[pairs[:, 0]], observed.cloud.points[pairs[:, 1]], matching, count, rng
     )
     starts += [T_cam_center @ T_center_model for T_center_model in found]

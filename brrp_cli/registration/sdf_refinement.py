@@ -1,6 +1,6 @@
 """Refine many placements at once: observed points slide onto the model's surface.
 
-Gauss-Newton on the sum of squared signed distances, which a lattice holds: point-to-plane ICP
+Gauss-Newton on the sum of squared signed distances, which a grid holds: point-to-plane ICP
 without a search for the nearest point, whose plane is that of the surface and not of a sample.
 """
 
@@ -19,7 +19,7 @@ STILL = 2e-5
 DAMPING = 1e-6
 
 
-def descend(
+def refine_to_sdf(
     T_model_cam: Array, observed: Array, model: Model, distance: float, iterations: int
 ) -> Array:
     """T_model_cam (B, 4, 4), similarities, each followed by the rigid motion that brings observed
@@ -46,7 +46,7 @@ def _step(points: NDArray[np.float32], model: Model, distance: float) -> Array:
     """Turn and shift (B, 6), about the model's middle, of points (3, B, n)."""
     _, batch, count = points.shape
     p = points.reshape(3, -1)
-    value, slope = model.distance_and_slope(p)
+    value, slope = model.distance_and_gradient(p)
     pulls = np.abs(value) < distance
     slope *= pulls
     rows = np.empty((6, batch * count), np.float32)

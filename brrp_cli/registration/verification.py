@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from brrp_cli.config import EvidenceConfig
+from brrp_cli.config import VerificationConfig
 from brrp_cli.frames.frame import Frame
 from brrp_cli.frames.projection import depth_behind
 from brrp_cli.observation.support_plane import Plane
@@ -17,7 +17,7 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Testimony:
+class Verifier:
     """One seen object: its points (n, 3), metres, camera frame, in random order, the frame that
     shows it, and the plane it stands on, where there is one."""
 
@@ -29,7 +29,7 @@ class Testimony:
         self,
         T_cam_model: Array,
         model: Model,
-        config: EvidenceConfig,
+        config: VerificationConfig,
         *,
         model_points: int,
         seen_points: int,
@@ -48,7 +48,7 @@ class Testimony:
         )
 
     def _explained(
-        self, T_cam_model: Array, model: Model, seen: Array, config: EvidenceConfig
+        self, T_cam_model: Array, model: Model, seen: Array, config: VerificationConfig
     ) -> Array:
         """Mean (B,) of a Gaussian of the observed points' distances, less a share of how far the
         others are, so that a search that explains nothing yet still has a slope."""
@@ -62,20 +62,20 @@ class Testimony:
         far = (np.minimum(distance, config.far) / config.far).mean(axis=1)
         return np.asarray(near - config.distance * far)
 
-    def _contradicted(self, points: Array, config: EvidenceConfig) -> Array:
+    def _contradicted(self, points: Array, config: VerificationConfig) -> Array:
         """Share (B,) of surfaces (3, B, m) that stands in front of the measured depth, soft in
         depth."""
         gap = depth_behind(points.reshape(3, -1).T, self.frame).reshape(points.shape[1:])
         return np.asarray(np.nan_to_num(_ramp(gap, config), copy=False).mean(axis=1))
 
-    def _below(self, points: Array, config: EvidenceConfig) -> Array:
+    def _below(self, points: Array, config: VerificationConfig) -> Array:
         if self.plane is None:
             return np.zeros(points.shape[1])
         height = np.tensordot(self.plane.normal, points, axes=1) + self.plane.offset
         return np.asarray(_ramp(-height, config).mean(axis=1))
 
 
-def _ramp(depth: Array, config: EvidenceConfig) -> Array:
+def _ramp(depth: Array, config: VerificationConfig) -> Array:
     return np.clip((depth - config.tolerance) / config.slope, 0, 1)
 
 

@@ -25,7 +25,7 @@ from brrp_cli.hdf5 import hdf5_bytes
 from brrp_cli.inference.hinge import HingeGrid
 from brrp_cli.inference.hypothesis_posterior import HypothesisPosterior
 from brrp_cli.inference.posterior import HilbertPosterior
-from brrp_cli.inference.prior_mean import MeanLattice
+from brrp_cli.inference.prior_mean import PriorMeanGrid
 from brrp_cli.methods.pointsdf import posterior_file as pointsdf_file
 from brrp_cli.methods.pointsdf.method import PointSDFPosterior
 from brrp_cli.methods.vprism.method import VPrismPosterior
@@ -154,7 +154,7 @@ def _read(group: h5py.Group) -> OccupancyPosterior:
     )
     if "mean" not in group:
         return particles
-    mean = MeanLattice(
+    mean = PriorMeanGrid(
         lower=np.asarray(attributes["mean_lower"], dtype=np.float64),
         spacing=float(attributes["mean_spacing"]),
         values=np.asarray(group["mean"], dtype=np.float16),

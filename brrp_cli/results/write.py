@@ -204,7 +204,7 @@ def _retrieved_record(found: Retrieved, T_target_cam: NDArray[np.float64]) -> di
         "scale": found.scale,
         "inliers": found.inliers,
         "fitness": found.fitness,
-        "evidence": found.evidence,
+        "alignment_score": found.alignment_score,
         "weight": found.weight,
         "T_frame_object": None if placed is None else (T_target_cam @ placed).tolist(),
     }

@@ -45,7 +45,7 @@ WEIGHTS = Weights(colour=24.26, pairs=25.27, size=0.44, offset=9.88)
 
 
 @dataclass(frozen=True)
-class Evidence:
+class Similarity:
     """How alike one seen object is to some stored objects.
 
     rows : (m,) which of the prior's n objects; colour : (g, m), one row for each light;
@@ -60,7 +60,7 @@ class Evidence:
 
 
 def believe(
-    evidence: Sequence[Evidence],
+    evidence: Sequence[Similarity],
     light: NDArray[np.floating],
     local: NDArray[np.floating],
     count: int,
@@ -86,7 +86,7 @@ def believe(
     return found
 
 
-def _log_odds(item: Evidence, count: int, weights: Weights) -> NDArray[np.float64]:
+def _log_odds(item: Similarity, count: int, weights: Weights) -> NDArray[np.float64]:
     shape = weights.pairs * (1 - item.hidden) * (item.pairs - 1) + weights.size * item.size
     colour = weights.colour * (item.colour.astype(np.float64) - 1)
     return np.asarray(weights.offset + colour + shape - np.log(count))

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from brrp_cli.descriptors.colour_histogram import colour_histograms
 from brrp_cli.descriptors.descriptor import roots
 from brrp_cli.retrieval.observed_appearance import SeenObject
-from brrp_cli.retrieval.score_fusion import NEUTRAL_COLOUR, NEUTRAL_PAIRS, Evidence
+from brrp_cli.retrieval.score_fusion import NEUTRAL_COLOUR, NEUTRAL_PAIRS, Similarity
 
 # Sizes differ by this much without meaning anything: metres for height and both sides of the
 # footprint, and a share of the stored one.
@@ -72,9 +72,9 @@ def evidence(
     stored: NDArray[Any],
     rows: NDArray[np.int64],
     lights: int,
-) -> Evidence:
+) -> Similarity:
     """All of it for stored descriptors (m,), which are those of the rows (m,) of the prior."""
-    return Evidence(
+    return Similarity(
         rows=rows,
         colour=colour_likeness(histograms, stored["colour"], lights),
         pairs=pair_likeness(seen.pairs, stored["pairs"]),

@@ -1,11 +1,11 @@
-"""The hull of what was seen, and its roof over the plane."""
+"""The hull of what was seen, and its height_map over the plane."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from brrp_cli.completion.convex_hull import hull_facets
-from brrp_cli.completion.height_map import roof_over
+from brrp_cli.completion.height_map import height_map_over
 from brrp_cli.config import CompletionConfig
 from brrp_cli.geometry import transform_points
 from brrp_cli.observation.support_plane import Plane, plane_frame
@@ -19,9 +19,9 @@ def test_the_roof_is_the_greatest_height_over_each_cell():
     flat = rng.uniform(0, 0.06, (6000, 2))
     height = np.where(flat[:, 0] < 0.03, 0.05, 0.02)
     points = np.column_stack([flat, height])
-    roof = roof_over(points, FLOOR, CONFIG)
+    height_map = height_map_over(points, FLOOR, CONFIG)
     probes = np.array([[0.01, 0.03, 0.1], [0.05, 0.03, 0.1], [0.05, 0.03, 0.01], [0.5, 0.5, 0.1]])
-    np.testing.assert_allclose(roof.above(probes), [0.05, 0.08, -0.01, 1.1], atol=1e-9)
+    np.testing.assert_allclose(height_map.above(probes), [0.05, 0.08, -0.01, 1.1], atol=1e-9)
     T = plane_frame(FLOOR)
     np.testing.assert_allclose(transform_points(T, probes)[:, 2], probes[:, 2], atol=1e-12)
 

@@ -1,11 +1,11 @@
-"""How far within the outline a pixel lies, how thick the part is that it shows, and normals."""
+"""How far within the silhouette a pixel lies, how thick the part is that it shows, and normals."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
-from brrp_cli.completion.silhouette import limb_width, within_outline
+from brrp_cli.completion.silhouette import local_thickness, within_silhouette
 from brrp_cli.completion.visible_part import surface_normals
 
 
@@ -17,7 +17,7 @@ def disc_with_a_handle():
 
 
 def test_within_the_outline_counts_pixels_to_the_background():
-    within = within_outline(disc_with_a_handle())
+    within = within_silhouette(disc_with_a_handle())
     assert within[60, 50] == pytest.approx(30, abs=1)
     assert within[60, 110] == pytest.approx(5, abs=1)
     assert within[5, 5] == 0
@@ -26,16 +26,16 @@ def test_within_the_outline_counts_pixels_to_the_background():
 def test_what_another_object_hides_may_go_on_and_the_edge_of_the_image_ends_it():
     segmap = np.zeros((40, 40), dtype=np.int64)
     segmap[10:30, 5:20], segmap[10:30, 20:35] = 1, 2
-    within = within_outline(segmap)
+    within = within_silhouette(segmap)
     assert within[20, 19] == pytest.approx(10, abs=1)
-    assert within_outline(np.ones((40, 40), dtype=np.int64))[20, 0] == 1
+    assert within_silhouette(np.ones((40, 40), dtype=np.int64))[20, 0] == 1
 
 
 def test_a_handle_is_thin_all_over_and_the_disc_thick_to_its_edge():
     segmap = disc_with_a_handle()
-    width = limb_width(within_outline(segmap))
+    width = local_thickness(within_silhouette(segmap))
     assert width[60, 95:125] == pytest.approx(5, abs=1)
-    # 24 pixels from the middle, where the outline is 6 pixels away.
+    # 24 pixels from the middle, where the silhouette is 6 pixels away.
     assert width[60 - 24, 50] > 24
     assert width.max() == pytest.approx(30, abs=1)
     np.testing.assert_array_equal(width == 0, segmap == 0)

@@ -1,4 +1,4 @@
-"""Prior means on lattices: where the nodes are, what lies between, what cannot be in an object."""
+"""Prior means on grids: where the nodes are, what lies between, what cannot be in an object."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from brrp_cli.config import MeanConfig
 from brrp_cli.frames.frame import Frame
 from brrp_cli.geometry import backproject
 from brrp_cli.inference.prior_mean import (
-    MeanLattice,
+    PriorMeanGrid,
     empty_space,
-    lattice_over,
+    grid_over,
     shape_logits,
 )
 from brrp_cli.observation.support_plane import Plane
@@ -26,12 +26,12 @@ BOX = np.array([[-0.1, 0.2, 1.0], [0.1, 0.25, 1.4]])
 
 def random_lattice():
     values = np.random.default_rng(0).normal(size=(2, 4, 5, 6)).astype(np.float16)
-    return MeanLattice(np.array([0.3, -0.2, 1.0]), 0.01, values, outside=-5.0)
+    return PriorMeanGrid(np.array([0.3, -0.2, 1.0]), 0.01, values, outside=-5.0)
 
 
 @pytest.mark.parametrize("nodes", [1000, 100_000])
 def test_the_lattice_covers_the_box_with_about_as_many_nodes_as_asked(nodes):
-    lower, spacing, grid = lattice_over(BOX, replace(CONFIG, nodes=nodes))
+    lower, spacing, grid = grid_over(BOX, replace(CONFIG, nodes=nodes))
     np.testing.assert_array_equal(lower, BOX[0])
     np.testing.assert_array_equal(grid[0, 0, 0], BOX[0])
     assert (grid[-1, -1, -1] >= BOX[1] - 1e-9).all()
@@ -48,43 +48,43 @@ def test_the_upper_corner_is_the_last_node():
 
 
 def test_at_the_nodes_the_logits_stand_as_they_are():
-    lattice = random_lattice()
+    grid = random_lattice()
     index = np.array([[0, 0, 0], [3, 4, 5], [1, 2, 3], [2, 0, 5]])
-    # The lattice ends with its last nodes: rounding must not put these outside.
+    # The grid ends with its last nodes: rounding must not put these outside.
     within = np.clip(index, 1e-6, np.array([3, 4, 5]) - 1e-6)
-    found = lattice.logits(lattice.lower + lattice.spacing * within)
-    np.testing.assert_allclose(found, lattice.values[(slice(None), *index.T)], atol=1e-5)
+    found = grid.logits(grid.lower + grid.spacing * within)
+    np.testing.assert_allclose(found, grid.values[(slice(None), *index.T)], atol=1e-5)
     assert found.shape == (2, 4) and found.dtype == np.float32
 
 
 def test_between_the_nodes_a_trilinear_function_is_itself():
-    lattice = random_lattice()
+    grid = random_lattice()
 
     def function(p):
-        x, y, z = ((p - lattice.lower) / lattice.spacing).T
+        x, y, z = ((p - grid.lower) / grid.spacing).T
         return 1 + x - 2 * y + z + x * y * z / 8
 
     nodes = np.stack(np.meshgrid(*map(np.arange, (4, 5, 6)), indexing="ij"), axis=-1)
-    values = function(lattice.lower + lattice.spacing * nodes.reshape(-1, 3)).reshape(1, 4, 5, 6)
-    exact = replace(lattice, values=values.astype(np.float32))
-    points = np.random.default_rng(1).uniform(lattice.lower, lattice.upper, (200, 3))
+    values = function(grid.lower + grid.spacing * nodes.reshape(-1, 3)).reshape(1, 4, 5, 6)
+    exact = replace(grid, values=values.astype(np.float32))
+    points = np.random.default_rng(1).uniform(grid.lower, grid.upper, (200, 3))
     np.testing.assert_allclose(exact.logits(points)[0], function(points), atol=1e-4)
 
 
 def test_off_the_lattice_everything_is_the_outside():
-    lattice = random_lattice()
+    grid = random_lattice()
     far = np.array([[0.0, 0, 0], [0.34, -0.18, 1.02], [0.31, -0.18, 0.9], [9, 9, 9]])
-    np.testing.assert_array_equal(lattice.logits(far), np.full((2, 4), -5.0))
+    np.testing.assert_array_equal(grid.logits(far), np.full((2, 4), -5.0))
 
 
 def test_the_volume_equals_the_points():
-    lattice = random_lattice()
+    grid = random_lattice()
     axes = (np.linspace(0.28, 0.34, 5), np.linspace(-0.2, -0.15, 6), np.linspace(1.0, 1.05, 7))
-    volume = lattice.volume(axes)
+    volume = grid.volume(axes)
     assert volume.shape == (2, 5, 6, 7)
     for i, j, k in [(1, 2, 3), (4, 0, 6), (2, 5, 1)]:
         point = np.array([[axes[0][i], axes[1][j], axes[2][k]]])
-        np.testing.assert_array_equal(volume[:, i, j, k], lattice.logits(point)[:, 0])
+        np.testing.assert_array_equal(volume[:, i, j, k], grid.logits(point)[:, 0])
 
 
 def test_a_placed_shape_is_even_where_it_ends_and_sure_far_from_there():
@@ -96,7 +96,9 @@ def test_a_placed_shape_is_even_where_it_ends_and_sure_far_from_there():
 
 def test_less_evidence_makes_a_softer_surface_in_the_same_place():
     near = CONFIG.growth + np.array([-0.002, 0.0, 0.002])
-    found = [shape_logits(near, evidence, CONFIG) for evidence in (0.85, 0.6, 0.2, -1.0)]
+    found = [
+        shape_logits(near, alignment_score, CONFIG) for alignment_score in (0.85, 0.6, 0.2, -1.0)
+    ]
     for sharp, soft in pairwise(found):
         assert sharp[0] > soft[0] > 0 > soft[2] > sharp[2]
         assert sharp[1] == soft[1] == 0

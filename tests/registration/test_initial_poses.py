@@ -11,7 +11,7 @@ from table_scene import NORMAL, TABLE, box, in_camera, photograph, placed, store
 from brrp_cli.config import FeatureConfig, RegistrationConfig
 from brrp_cli.geometry import normalise, transform_points
 from brrp_cli.observation.support_plane import Plane, plane_frame
-from brrp_cli.registration.initial_poses import matched_starts, resting_starts
+from brrp_cli.registration.initial_poses import feature_matched_poses, resting_initial_poses
 from brrp_cli.registration.model import search_model
 from brrp_cli.registration.scale_scan import observed_cloud
 
@@ -33,7 +33,7 @@ def model():
 
 @pytest.fixture(scope="module")
 def starts(model, points):
-    return resting_starts(model, points, TABLE, TURNS)
+    return resting_initial_poses(model, points, TABLE, TURNS)
 
 
 @pytest.mark.parametrize(
@@ -134,7 +134,7 @@ def test_where_more_is_hidden_each_end_is_tried_as_the_seen_one(model, points, p
 
 def test_a_stray_point_moves_no_start(model, points, starts):
     stray = np.concatenate([points[:1] + [0.3, 0.0, 0.2], points])
-    again = resting_starts(model, stray, TABLE, TURNS)
+    again = resting_initial_poses(model, stray, TABLE, TURNS)
     assert len(again) == len(starts)
     np.testing.assert_allclose(again, starts, atol=2e-3)
 
@@ -152,7 +152,7 @@ def test_one_of_the_starts_is_near_the_truth(model, starts):
 
 def test_without_features_to_match_the_model_stands_unturned_behind_its_front(model, points):
     observed = observed_cloud(points, FEATURES)
-    starts = matched_starts(model, observed, FEATURES, RegistrationConfig(), 0, 0)
+    starts = feature_matched_poses(model, observed, FEATURES, RegistrationConfig(), 0, 0)
     assert len(starts) == 1
     np.testing.assert_array_equal(starts[0][:3, :3], np.eye(3))
     moved = starts[0][:3, 3] - observed.center
@@ -163,9 +163,9 @@ def test_without_features_to_match_the_model_stands_unturned_behind_its_front(mo
 def test_matchings_are_rigid_and_repeat_their_seed(model, points):
     observed = observed_cloud(points, FEATURES)
     config = RegistrationConfig(iterations=2000)
-    starts = matched_starts(model, observed, FEATURES, config, 3, 7)
+    starts = feature_matched_poses(model, observed, FEATURES, config, 3, 7)
     assert 2 <= len(starts) <= 4
     for T in starts:
         np.testing.assert_allclose(T[:3, :3] @ T[:3, :3].T, np.eye(3), atol=1e-6)
-    again = matched_starts(model, observed, FEATURES, config, 3, 7)
+    again = feature_matched_poses(model, observed, FEATURES, config, 3, 7)
     np.testing.assert_array_equal(starts, again)

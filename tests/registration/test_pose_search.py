@@ -10,7 +10,7 @@ from table_scene import MESHES, PARAMETERS, TABLE, in_camera, photograph, placed
 
 from brrp_cli.config import SearchConfig
 from brrp_cli.geometry import similarity, transform_points
-from brrp_cli.registration import verification as testimony
+from brrp_cli.registration import verification as verifier
 from brrp_cli.registration.model import search_model
 from brrp_cli.registration.pose_search import search
 from brrp_cli.registration.scale_scan import observed_cloud
@@ -28,7 +28,7 @@ def find(name, T_cam_mesh, *, size=1.0, plane=TABLE, seed=0, config=CONFIG, best
     return search(
         search_model(stored(name)),
         observed_cloud(points, PARAMETERS.features),
-        testimony.Testimony(points, frame, plane),
+        verifier.Verifier(points, frame, plane),
         PARAMETERS.features,
         config,
         seed,
@@ -49,10 +49,10 @@ def test_an_ell_is_found_where_it_stands_at_its_own_size(yaw):
     found = find("ell", truth)
     assert errors(found[0], truth).max() < 0.002
     assert found[0].scale == 1.0
-    assert found[0].evidence > 0.8
+    assert found[0].alignment_score > 0.8
     assert 1 <= len(found) <= CONFIG.kept
-    evidence = [each.evidence for each in found]
-    assert evidence == sorted(evidence, reverse=True)
+    alignment_score = [each.alignment_score for each in found]
+    assert alignment_score == sorted(alignment_score, reverse=True)
 
 
 def test_a_box_is_found_up_to_what_maps_it_to_itself():
@@ -75,14 +75,14 @@ def test_an_object_of_another_size_is_found_at_that_scale(size):
 
 
 def test_no_other_size_is_tried_of_what_lies_well_enough():
-    """An object of 0.8 of its size, when any evidence is held for enough, and when none is."""
+    """An object of 0.8 of its size, when any score is held for enough, and when none is."""
     truth = placed(0.0, 0.03, 1.2)
     settled, tried = (
         find("ell", truth, size=0.8, config=replace(CONFIG, settled=enough))
         for enough in (-np.inf, np.inf)
     )
     assert {each.scale for each in settled} == {1.0}
-    assert tried[0].scale == 0.8 and tried[0].evidence > settled[0].evidence
+    assert tried[0].scale == 0.8 and tried[0].alignment_score > settled[0].alignment_score
 
 
 def test_what_is_hopeless_is_judged_as_it_lies():
@@ -98,7 +98,9 @@ def test_what_another_model_has_beaten_is_judged_as_it_lies():
         find("ell", truth, size=0.8, config=config, best=best)
         for best in (CONFIG.beaten, 1 + CONFIG.beaten)
     )
-    assert {each.scale for each in beaten} == {1.0} and beaten[0].evidence < close[0].evidence
+    assert {each.scale for each in beaten} == {1.0} and beaten[0].alignment_score < close[
+        0
+    ].alignment_score
     assert close[0].scale == 0.8
 
 
@@ -125,7 +127,7 @@ def test_an_object_is_found_whose_one_end_is_hidden():
     found = search(
         search_model(stored("ell")),
         observed_cloud(seen, PARAMETERS.features),
-        testimony.Testimony(seen, frame, TABLE),
+        verifier.Verifier(seen, frame, TABLE),
         PARAMETERS.features,
         CONFIG,
         0,
@@ -150,7 +152,7 @@ def test_the_same_seed_gives_the_same_bytes():
     assert [each.T_cam_model.tobytes() for each in first] == [
         each.T_cam_model.tobytes() for each in again
     ]
-    assert [each.evidence for each in first] == [each.evidence for each in again]
+    assert [each.alignment_score for each in first] == [each.alignment_score for each in again]
 
 
 def test_a_wrong_object_is_less_believed_than_the_right_one():
@@ -158,12 +160,12 @@ def test_a_wrong_object_is_less_believed_than_the_right_one():
     frame = photograph({ID: in_camera(MESHES["ell"](), truth)})
     points = np.random.default_rng(0).permutation(frame.object_points(ID)).astype(np.float64)
     observed = observed_cloud(points, PARAMETERS.features)
-    seen = testimony.Testimony(points, frame, TABLE)
+    seen = verifier.Verifier(points, frame, TABLE)
     right, wrong = (
         search(search_model(stored(name)), observed, seen, PARAMETERS.features, CONFIG, 0)[0]
         for name in ("ell", "box")
     )
-    assert wrong.evidence < right.evidence - 0.2
+    assert wrong.alignment_score < right.alignment_score - 0.2
 
 
 def test_the_placement_from_normalised_coordinates_is_the_same_one():

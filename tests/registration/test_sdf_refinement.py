@@ -10,9 +10,9 @@ from brrp_cli.config import RegistrationConfig
 from brrp_cli.geometry import similarity, transform_points
 from brrp_cli.prior.distance_field import DistanceField
 from brrp_cli.prior.objects import PriorObject
-from brrp_cli.registration.batched_ransac import drawn_motions
+from brrp_cli.registration.batched_ransac import ransac_motions
 from brrp_cli.registration.model import Model
-from brrp_cli.registration.sdf_refinement import descend
+from brrp_cli.registration.sdf_refinement import refine_to_sdf
 
 HALF = np.array([0.05, 0.03, 0.02])
 
@@ -60,7 +60,7 @@ def moved(seed, degrees, metres):
 
 def test_slope_and_distance_are_those_of_the_field(field):
     points = np.random.default_rng(1).uniform(-0.1, 0.1, (500, 3))
-    distance, slope = field.distance_and_slope(points.T.astype(np.float32))
+    distance, slope = field.distance_and_gradient(points.T.astype(np.float32))
     np.testing.assert_allclose(distance, field.signed_distance(points), atol=1e-6)
     step = 1e-5
     for axis, unit in enumerate(np.eye(3)):
@@ -77,7 +77,7 @@ def test_placements_slide_onto_the_surface(model, surface, scale):
     observed = transform_points(T_cam_true, surface)
     T_true_cam = np.linalg.inv(T_cam_true)
     starts = np.stack([moved(seed, 8, 0.008) @ T_true_cam for seed in range(6)])
-    found = descend(starts, observed, model, 0.03, 15)
+    found = refine_to_sdf(starts, observed, model, 0.03, 15)
     for start, T in zip(starts, found, strict=True):
         before, after = (np.abs(box_distance(transform_points(t, observed))) for t in (start, T))
         assert after.mean() < 2e-4 < before.mean()
@@ -86,7 +86,7 @@ def test_placements_slide_onto_the_surface(model, surface, scale):
 
 def test_a_placement_that_nothing_pulls_stays(model, surface):
     far = similarity(translation=np.array([1.0, 0, 0]))
-    found = descend(np.stack([far, np.eye(4)]), surface, model, 0.01, 15)
+    found = refine_to_sdf(np.stack([far, np.eye(4)]), surface, model, 0.01, 15)
     np.testing.assert_array_equal(found[0], far)
     np.testing.assert_allclose(found[1], np.eye(4), atol=2e-3)
 
@@ -106,7 +106,7 @@ def matches(wrong, seed=0):
 
 def test_draws_find_the_motion_among_wrong_matches():
     source, target, T = matches(40)
-    found = drawn_motions(source, target, CONFIG, 4, np.random.default_rng(0))
+    found = ransac_motions(source, target, CONFIG, 4, np.random.default_rng(0))
     assert len(found) == 4
     for each in found:
         off = transform_points(each, source[40:]) - transform_points(T, source[40:])
@@ -117,13 +117,13 @@ def test_draws_find_the_motion_among_wrong_matches():
 def test_matches_that_never_hold_together_give_nothing():
     rng = np.random.default_rng(0)
     source, target = rng.uniform(-1, 1, (2, 30, 3))
-    assert drawn_motions(source, 50 * target, CONFIG, 2, rng) == []
-    assert drawn_motions(source[:2], target[:2], CONFIG, 2, rng) == []
+    assert ransac_motions(source, 50 * target, CONFIG, 2, rng) == []
+    assert ransac_motions(source[:2], target[:2], CONFIG, 2, rng) == []
 
 
 def test_the_same_seed_draws_the_same():
     source, target, _ = matches(40)
     one, two = (
-        drawn_motions(source, target, CONFIG, 2, np.random.default_rng(5)) for _ in range(2)
+        ransac_motions(source, target, CONFIG, 2, np.random.default_rng(5)) for _ in range(2)
     )
     np.testing.assert_array_equal(one, two)

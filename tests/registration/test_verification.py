@@ -18,16 +18,16 @@ from table_scene import (
     stored,
 )
 
-from brrp_cli.config import EvidenceConfig, WeighConfig
+from brrp_cli.config import VerificationConfig, WeighConfig
 from brrp_cli.demo.layout import turn
 from brrp_cli.frames.frame import Frame
 from brrp_cli.frames.projection import at_pixels, depth_behind
 from brrp_cli.geometry import backproject, project, similarity
-from brrp_cli.registration import verification as testimony
+from brrp_cli.registration import verification as verifier
 from brrp_cli.registration.model import Model, search_model
 
 BOX = 5
-CONFIG = EvidenceConfig()
+CONFIG = VerificationConfig()
 NORMAL = TABLE.normal
 
 
@@ -46,7 +46,7 @@ def truth():
 def seen():
     frame = photograph({BOX: in_camera(box(), placed(0.02, -0.03, 0.5))})
     points = np.random.default_rng(0).permutation(frame.object_points(BOX)).astype(np.float64)
-    return testimony.Testimony(points, frame, TABLE)
+    return verifier.Verifier(points, frame, TABLE)
 
 
 def moved(T_cam_model, *, world=(0.0, 0.0, 0.0), yaw=0.0):
@@ -63,7 +63,7 @@ def score(seen, placements, model, config=CONFIG, *, model_points=2000, seen_poi
 
 
 def test_the_true_placement_stands_above_the_unknown(seen, truth, model):
-    assert score(seen, [truth], model)[0] > WeighConfig().unknown_evidence + 0.1
+    assert score(seen, [truth], model)[0] > WeighConfig().unknown_score + 0.1
 
 
 def test_what_is_missing_from_one_is_the_way_between_stored_points(seen, truth, model):
@@ -130,7 +130,7 @@ def test_hidden_space_says_nothing(seen, truth, model):
     """20 cm away from the camera it would be below the table; without one, nothing is against."""
     away = truth.copy()
     away[:3, 3] *= 1 + 0.2 / np.linalg.norm(truth[:3, 3])
-    free = testimony.Testimony(seen.points, seen.frame, None)
+    free = verifier.Verifier(seen.points, seen.frame, None)
     assert score(free, [away], model)[0] == pytest.approx(-CONFIG.distance, abs=0.02)
     assert score(seen, [away], model)[0] < -CONFIG.distance - 0.5
 
@@ -139,7 +139,7 @@ def test_the_share_below_the_plane_is_counted(seen, truth, model):
     """Half a box's height under the table: half of the upright sides and the bottom."""
     sunk = moved(truth, world=(0, 0, -0.07))
     with_plane = score(seen, [sunk], model)[0]
-    without = score(testimony.Testimony(seen.points, seen.frame, None), [sunk], model)[0]
+    without = score(verifier.Verifier(seen.points, seen.frame, None), [sunk], model)[0]
     heights = TABLE.signed_distance(model.surface @ sunk[:3, :3].T + sunk[:3, 3])
     full = (heights < -CONFIG.tolerance - CONFIG.slope).mean()
     some = (heights < -CONFIG.tolerance).mean()

@@ -39,7 +39,7 @@ def inferred() -> ObjectReconstruction:
         ("T_cam_object", "Registration of cup"),
         ("scale", "Registration of cup"),
         ("fitness", "Registration of cup"),
-        ("evidence", "Registration of cup"),
+        ("alignment_score", "Registration of cup"),
         ("weight", "Registration of cup"),
     ],
 )

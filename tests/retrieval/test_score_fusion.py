@@ -3,14 +3,14 @@ import pytest
 
 from brrp_cli.retrieval.base import unknown
 from brrp_cli.retrieval.illuminants import lights, local_lights, log_prior
-from brrp_cli.retrieval.score_fusion import Evidence, Weights, believe
+from brrp_cli.retrieval.score_fusion import Similarity, Weights, believe
 
 WEIGHTS = Weights(colour=20.0, pairs=20.0, size=0.5, offset=8.0)
 FLAT, SAME = np.zeros(2), np.eye(2)
 
 
 def seen(colour, pairs=(1.0, 1.0), size=(0.0, 0.0), hidden=0.0):
-    return Evidence(
+    return Similarity(
         rows=np.arange(2),
         colour=np.array(colour, np.float32),
         pairs=np.array(pairs, np.float32),
@@ -47,7 +47,7 @@ def test_the_formula_in_plain_numbers():
 
 
 def test_objects_that_were_not_looked_at_have_no_probability():
-    item = Evidence(
+    item = Similarity(
         np.array([4, 1]), *(np.ones(s, np.float32) for s in ((2, 2), 2)), np.zeros(2), 0
     )
     found = believe([item], FLAT, SAME, 6, WEIGHTS)[0]

@@ -14,7 +14,7 @@ from brrp_cli.config import SurfaceConfig, preset
 from brrp_cli.inference.hinge import HingeGrid
 from brrp_cli.inference.hypothesis_posterior import HypothesisPosterior
 from brrp_cli.inference.posterior import HilbertPosterior
-from brrp_cli.inference.prior_mean import MeanLattice
+from brrp_cli.inference.prior_mean import PriorMeanGrid
 from brrp_cli.raycast import raycasting_scene
 from brrp_cli.reconstruction import OK, TOO_FEW_POINTS, ObjectReconstruction, Retrieved
 from brrp_cli.results.write import write_results
@@ -61,7 +61,7 @@ def posterior_on(
     none = HilbertPosterior(
         np.zeros((len(which), grid.dimension), np.float32), bounds.mean(axis=0), grid, 1.0
     )
-    mean = MeanLattice(bounds[0], spacing, values.astype(np.float16), outside=-8.0)
+    mean = PriorMeanGrid(bounds[0], spacing, values.astype(np.float16), outside=-8.0)
     return HypothesisPosterior(mean, np.array(which), none)
 
 
@@ -92,8 +92,10 @@ def write_made_result(folder: Path, *, frame: str = "camera") -> Path:
             OK,
             n_points=int((segmap == object_id).sum()),
             retrieved=[
-                Retrieved("a <b>box</b> & more", 0.75, np.eye(4), 1.0, evidence=0.9, weight=0.97),
-                Retrieved("mug", 0.05, np.eye(4), 0.9, evidence=0.2, weight=0.0),
+                Retrieved(
+                    "a <b>box</b> & more", 0.75, np.eye(4), 1.0, alignment_score=0.9, weight=0.97
+                ),
+                Retrieved("mug", 0.05, np.eye(4), 0.9, alignment_score=0.2, weight=0.0),
             ],
             unknown_probability=0.2,
             unknown_weight=0.03,

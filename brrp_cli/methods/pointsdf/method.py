@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from brrp_cli.config import PointSDFConfig
 from brrp_cli.frames.frame import Frame
-from brrp_cli.methods.coarse_to_fine import likely_lattice
+from brrp_cli.methods.coarse_to_fine import coarse_to_fine_volume
 from brrp_cli.methods.pointsdf.farthest_points import farthest_points
 from brrp_cli.observation.ray_samples import box_center
 from brrp_cli.reconstruction import METRES, OK, TOO_FEW_POINTS, Axes, ObjectReconstruction
@@ -74,9 +74,9 @@ class PointSDFPosterior:
         return result
 
     def probability_volume(self, axes: Axes) -> NDArray[np.float32]:
-        """`probability` (nx, ny, nz) on a lattice of camera-frame coordinates, metres; between
+        """`probability` (nx, ny, nz) on a grid of camera-frame coordinates, metres; between
         nodes where nothing is likely."""
-        return likely_lattice(self.probability, axes)
+        return coarse_to_fine_volume(self.probability, axes)
 
     def uncertainty(self, points: NDArray[np.floating]) -> NDArray[np.float32]:
         """Variance (n,) of occupancy, p (1 - p): all that a single network can say."""

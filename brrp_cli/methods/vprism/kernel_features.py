@@ -107,14 +107,14 @@ class BlockFeatures:
 def kernel_features(points: Floats, basis: KernelBasis, cell: float) -> BlockFeatures:
     """Features of points (n, 3), metres, grouped by cubes of side `cell`, metres.
 
-    The cubes lie on a fixed lattice, so a point's columns do not depend on the other points.
+    The cubes lie on a fixed grid, so a point's columns do not depend on the other points.
     """
     blocks = [_block(points, rows, corner, basis, cell) for rows, corner in _cubes(points, cell)]
     return BlockFeatures(n=len(points), size=basis.size, blocks=blocks)
 
 
 def _cubes(points: Floats, cell: float) -> list[tuple[NDArray[np.intp], Floats]]:
-    """Rows of each occupied cube of the lattice, with its lower corner (3,)."""
+    """Rows of each occupied cube of the grid, with its lower corner (3,)."""
     if not len(points):
         return []
     keys, inverse = np.unique(np.floor(points / cell).astype(np.int64), axis=0, return_inverse=True)

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from brrp_cli.config import VPrismConfig
 from brrp_cli.frames.frame import Frame
-from brrp_cli.methods.coarse_to_fine import likely_lattice
+from brrp_cli.methods.coarse_to_fine import coarse_to_fine_volume
 from brrp_cli.methods.vprism.expected_softmax import expected_softmax
 from brrp_cli.methods.vprism.hinge_points import scene_hinges
 from brrp_cli.methods.vprism.kernel_features import KernelBasis
@@ -52,9 +52,9 @@ class VPrismPosterior:
         return result
 
     def probability_volume(self, axes: Axes) -> NDArray[np.float32]:
-        """`probability` (nx, ny, nz) on a lattice of camera-frame coordinates, metres; between
+        """`probability` (nx, ny, nz) on a grid of camera-frame coordinates, metres; between
         nodes where nothing is likely."""
-        return likely_lattice(self.probability, axes)
+        return coarse_to_fine_volume(self.probability, axes)
 
     @property
     def surface_unit(self) -> str:

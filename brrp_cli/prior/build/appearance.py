@@ -12,7 +12,7 @@ from brrp_cli.descriptors.extents import standing_size
 from brrp_cli.descriptors.point_pairs import pair_histogram
 from brrp_cli.geometry import transform_points
 from brrp_cli.prior.build.coloured_mesh import PaintedMesh
-from brrp_cli.prior.build.views import SeenSide, look_around
+from brrp_cli.prior.build.views import SeenSide, views_around
 from brrp_cli.prior.objects import RestingPose
 from brrp_cli.prior.parameters import AppearanceConfig
 
@@ -28,7 +28,7 @@ def describe_appearance(
 ) -> Appearance:
     """Colour and shape of `painted`, the mesh as it was given; sizes of `closed`, its repaired
     surface, in `poses`. Both in the mesh's own metres."""
-    sides = look_around(painted, config.views, config.rays)
+    sides = views_around(painted, config.views, config.rays)
     hull = np.asarray(closed.convex_hull.vertices)
     return Appearance(
         colour=to_bytes(np.stack([_colour(side) for side in sides])),

@@ -13,13 +13,13 @@ from brrp_cli.errors import BrrpError, DependencyError, MeshError, PriorError
 from brrp_cli.executors import run_tasks
 from brrp_cli.files import sha256_file
 from brrp_cli.prior.appearance_file import is_whole, sidecar_file, write_sidecar
-from brrp_cli.prior.appearance_index import open_looks
+from brrp_cli.prior.appearance_index import open_appearance_index
 from brrp_cli.prior.build.descriptions import describe, read_descriptions
 from brrp_cli.prior.build.find_meshes import MeshSource, find_meshes
 from brrp_cli.prior.build.lock import only_builder
 from brrp_cli.prior.build.make_object import make_object
 from brrp_cli.prior.build.mesh_files import input_sha256
-from brrp_cli.prior.build.reuse import Finished, Stock, take_stock
+from brrp_cli.prior.build.reuse import Finished, Reusable, reusable_objects
 from brrp_cli.prior.build.shard_plan import plan_shards, shard_file
 from brrp_cli.prior.index import read_index
 from brrp_cli.prior.manifest import (
@@ -81,7 +81,7 @@ def build_prior(
         before = _previous(out)
         if before is not None and not overwrite:
             refuse_differences(before.parameters, table, out)
-        run = _Run(out, table, sources, take_stock(out, before, table))
+        run = _Run(out, table, sources, reusable_objects(out, before, table))
         run.hash_inputs()
         run.make(parameters or BuildParameters(), workers or cores(), time_limit, progress)
         manifest = run.with_sidecar(run.manifest(phrases), before)
@@ -94,7 +94,7 @@ def build_prior(
         if before is None or before.as_bytes() != manifest.as_bytes():
             write_manifest(out, manifest)
         # Now, so that not the first to open the prior pays for it.
-        open_looks(out, read_index(out), lambda: manifest)
+        open_appearance_index(out, read_index(out), lambda: manifest)
         _sweep(out, manifest)
     names = {entry.name for entry in manifest.objects}
     return BuildReport(
@@ -125,7 +125,7 @@ class _Run:
     out: Path
     parameters: dict[str, Any]
     sources: dict[str, MeshSource]
-    stock: Stock
+    stock: Reusable
     hashes: dict[str, str] = field(default_factory=dict)
     failed: dict[str, str] = field(default_factory=dict)
     made: dict[str, None] = field(default_factory=dict)

@@ -25,17 +25,19 @@ class Finished:
     record: dict[str, Any]
 
 
-Stock = dict[tuple[str, str], Finished]
+Reusable = dict[tuple[str, str], Finished]
 
 
-def take_stock(folder: Path, manifest: Manifest | None, parameters: dict[str, Any]) -> Stock:
+def reusable_objects(
+    folder: Path, manifest: Manifest | None, parameters: dict[str, Any]
+) -> Reusable:
     """(name, input_sha256) -> Finished, for all objects made with these parameters.
 
     Shards that the manifest lists are checked against its sha256. Others, which a run left that
     was killed before it could write the manifest, are read and checked object by object. Damaged
     shards are noted and left out, so that their objects are made again.
     """
-    stock: Stock = {}
+    stock: Reusable = {}
     listed = set()
     if manifest is not None and manifest.parameters == parameters:
         members: defaultdict[str, list[ObjectEntry]] = defaultdict(list)
@@ -61,7 +63,7 @@ def take_stock(folder: Path, manifest: Manifest | None, parameters: dict[str, An
     return stock
 
 
-def _unlisted(path: Path, file: str, parameters: dict[str, Any]) -> Stock:
+def _unlisted(path: Path, file: str, parameters: dict[str, Any]) -> Reusable:
     with open_shard(path) as shard:
         if parse_json(shard.attrs["parameters"]) != parameters:
             return {}

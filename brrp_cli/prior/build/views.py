@@ -34,7 +34,7 @@ def directions(count: int) -> NDArray[np.float64]:
     return np.stack([ring * np.cos(angle), ring * np.sin(angle), z], axis=-1)
 
 
-def look_around(mesh: PaintedMesh, count: int, rays: int = RAYS) -> list[SeenSide]:
+def views_around(mesh: PaintedMesh, count: int, rays: int = RAYS) -> list[SeenSide]:
     """The mesh from `count` directions, with about `rays` parallel rays through its outline's box.
 
     The same mesh gives the same sides: nothing is drawn at random.

@@ -19,7 +19,7 @@ from brrp_cli.methods.pointsdf.weights import load_weights
 from brrp_cli.raycast import inside
 from brrp_cli.reconstruction import METRES
 from brrp_cli.results.posterior_file import open_posterior, save_posteriors
-from brrp_cli.surface.extract import extract_surface, lattice_axes
+from brrp_cli.surface.extract import extract_surface, grid_axes
 
 CENTER = np.array([0.1, -0.2, 0.8])
 RADIUS, WIDTH = 0.06, 0.004
@@ -59,7 +59,7 @@ def test_nothing_is_occupied_outside_of_the_box(ball):
 
 
 def test_a_lattice_is_that_of_its_points_where_it_counts(ball):
-    axes = lattice_axes(ball.bounds, 0.005)
+    axes = grid_axes(ball.bounds, 0.005)
     volume = ball.probability_volume(axes)
     nodes = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
     exact = ball.probability(nodes.reshape(-1, 3)).reshape(volume.shape)

@@ -11,7 +11,7 @@ from brrp_cli.frames.frame import Frame
 from brrp_cli.geometry import transform_points
 from brrp_cli.methods.vprism.method import reconstruct_vprism
 from brrp_cli.reconstruction import OK, TOO_FEW_POINTS
-from brrp_cli.surface.extract import lattice_axes
+from brrp_cli.surface.extract import grid_axes
 
 # Boxes on the table z = 0 of the world: lower and upper corner, metres.
 BOXES = {
@@ -173,7 +173,7 @@ def test_updates_in_parts_come_close_to_one_update(frame, found):
 @pytest.mark.parametrize("object_id", BOXES)
 def test_a_lattice_is_that_of_its_points_where_it_counts(found, object_id):
     posterior = found[object_id].posterior
-    axes = lattice_axes(posterior.bounds, 0.01)
+    axes = grid_axes(posterior.bounds, 0.01)
     volume = posterior.probability_volume(axes)
     nodes = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
     exact = posterior.probability(nodes.reshape(-1, 3)).reshape(volume.shape)

@@ -5,7 +5,7 @@ from PIL import Image
 
 from brrp_cli.errors import MeshError
 from brrp_cli.prior.build.coloured_mesh import load_painted, unpainted
-from brrp_cli.prior.build.views import directions, look_around
+from brrp_cli.prior.build.views import directions, views_around
 
 RED, GREEN = (200, 30, 20), (20, 180, 60)
 
@@ -15,7 +15,7 @@ def box():
 
 
 def seen_colours(path, **options):
-    sides = look_around(load_painted(path, **options), 12, 300)
+    sides = views_around(load_painted(path, **options), 12, 300)
     return np.concatenate([side.rgb for side in sides])
 
 
@@ -23,7 +23,7 @@ def test_vertex_colours(tmp_path):
     mesh = box()
     mesh.visual.vertex_colors = np.where(mesh.vertices[:, :1] > 0, [RED], [GREEN])
     mesh.export(tmp_path / "box.ply")
-    for side in look_around(load_painted(tmp_path / "box.ply"), 12, 300):
+    for side in views_around(load_painted(tmp_path / "box.ply"), 12, 300):
         at_end = np.abs(side.points[:, 0]) > 0.0499
         expected = np.where(side.points[at_end, :1] > 0, [RED], [GREEN])
         np.testing.assert_allclose(side.rgb[at_end], expected, atol=2)
@@ -39,7 +39,7 @@ def test_a_texture_is_the_right_way_up(tmp_path):
     mesh.visual = trimesh.visual.TextureVisuals(uv=uv, material=material)
     (tmp_path / "box").mkdir()
     mesh.export(tmp_path / "box" / "box.obj")
-    for side in look_around(load_painted(tmp_path / "box" / "box.obj"), 12, 300):
+    for side in views_around(load_painted(tmp_path / "box" / "box.obj"), 12, 300):
         high = side.points[:, 2] > 0.012
         low = side.points[:, 2] < -0.012
         assert np.allclose(side.rgb[high], RED, atol=3) and np.allclose(
@@ -79,7 +79,7 @@ def test_directions_are_spread_evenly():
 
 def test_what_is_seen_lies_on_the_surface_and_faces_the_viewer():
     mesh = box()
-    for toward, side in zip(directions(12), look_around(unpainted(mesh), 12, 400), strict=True):
+    for toward, side in zip(directions(12), views_around(unpainted(mesh), 12, 400), strict=True):
         assert len(side.points) > 50
         distance = np.abs(np.abs(side.points) - mesh.extents / 2).min(axis=1)
         assert distance.max() < 1e-5
@@ -90,6 +90,6 @@ def test_far_from_the_origin_nothing_changes():
     near, far = box(), box()
     far.apply_translation([40.0, -90.0, 3.0])
     for one, two in zip(
-        look_around(unpainted(near), 6), look_around(unpainted(far), 6), strict=True
+        views_around(unpainted(near), 6), views_around(unpainted(far), 6), strict=True
     ):
         np.testing.assert_allclose(one.points, two.points, atol=1e-4)
