@@ -172,8 +172,8 @@ class MeanConfig:
 
     A placed shape is -(signed distance - growth) / width, limited to +-limit; an alignment
     score under `sure` widens it by `doubt` for each unit. An object that none explains is completed
-    by a network, which is evaluated at every node where the coarse ones around are not all `beyond_doubt`; its logit
-    is `shell_logit` at least for `shell` metres behind what is seen of it. Space is empty that lies
+    by a network, which is evaluated at every node where the coarse ones around are not all
+    `beyond_doubt`; its logit is `shell_logit` at least for `shell` metres behind what is seen of it. Space is empty that lies
     more than `carve_depth` in front of the measured depth, or `carve_plane` below the plane, or
     less than `carve_behind` behind what is no object's and more than `carve_pixels` from the mask.
     """

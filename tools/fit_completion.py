@@ -58,8 +58,8 @@ FAR_MARGIN = 0.2  # metres
 HIDDEN = 64
 BATCH = 4096
 MIN_PIXELS = 100
-# Standard deviations of what is added to inputs, in theirs. An object's own features, the same at all
-# of its points, would else be learnt by heart.
+# Standard deviations of what is added to inputs, in theirs. An object's own features, the same at
+# all of its points, would else be learnt by heart.
 JITTER, JITTER_WHOLE = 0.03, 0.1
 
 
