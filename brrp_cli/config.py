@@ -59,6 +59,19 @@ class ObservationConfig:
 
 
 @dataclass(frozen=True)
+class SensorConfig:
+    """How far measured depth errs: a standard deviation of noise + noise_growth * depth^2, metres.
+
+    sure : standard deviations in front of the measured depth from which on space is free for
+    certain
+    """
+
+    noise: float = 0.0012
+    noise_growth: float = 0.0015
+    sure: float = 3.0
+
+
+@dataclass(frozen=True)
 class InferenceConfig:
     """Hilbert map and SVGD (paper, sections III-A, III-B and IV-D)."""
 
@@ -77,16 +90,27 @@ class InferenceConfig:
 
 @dataclass(frozen=True)
 class SurfaceConfig:
-    """Marching cubes on the mean occupancy at `level`.
+    """The surface where the mean occupancy is `level`.
 
-    Where half of the volume is unseen, the overlap with the truth is expected to be largest at less
-    than a half: at half of that overlap (Lipton et al., 2014, for F1).
+    A stored mesh is moved along its normals by at most `farthest` metres, and inwards or outwards
+    by no more than a share `wall_share` of the wall's thickness; the level set is looked for at
+    `steps` places of that way. Where more than a share `most_off` of its vertices would have to be
+    moved further, and where no stored object explains what is seen, the surface comes from marching
+    cubes on a grid of about `nodes` nodes, whose spacing in metres lies between `finest` and
+    `spacing`.
+    keep_distance : metres; a component of the level set further from every observed point is
+    hallucinated
     """
 
-    level: float = 0.4
+    level: float = 0.5
     spacing: float = 0.005
-    # A component of the level set further than this from every observed point is hallucinated.
+    finest: float = 0.002
+    nodes: int = 300_000
     keep_distance: float = 0.01
+    farthest: float = 0.004
+    wall_share: float = 0.4
+    steps: int = 17
+    most_off: float = 0.05
 
 
 @dataclass(frozen=True)
@@ -168,21 +192,21 @@ class WeighConfig:
 
 @dataclass(frozen=True)
 class MeanConfig:
-    """Mean functions of hypotheses, logits on a grid of about `nodes` nodes.
+    """Prior mean functions of hypotheses, as logits.
 
-    A placed shape is -(signed distance - growth) / width, limited to +-limit; an alignment
-    score under `sure` widens it by `doubt` for each unit. An object that none explains is completed
-    by a network, which is evaluated at every node where the coarse ones around are not all
-    `beyond_doubt`; its logit is `shell_logit` at least for `shell` metres behind what is seen of it. Space is empty that lies
-    more than `carve_depth` in front of the measured depth, or `carve_plane` below the plane, or
-    less than `carve_behind` behind what is no object's and more than `carve_pixels` from the mask.
+    A placed shape is -(signed distance) / width, limited to +-limit; an alignment score under
+    `sure` widens it by `doubt` metres for each unit. An object that none explains is completed on a
+    grid of about `nodes` nodes by a network, which is evaluated at every node where the coarse ones
+    around are not all `beyond_doubt`; its logit is `shell_logit` at least for `shell` metres behind
+    what is seen of it. Space is empty that lies more than `carve_depth` in front of the measured
+    depth, or `carve_plane` below the plane, or less than `carve_behind` behind what is no object's
+    and more than `carve_pixels` from the mask.
     """
 
     nodes: int = 200_000
-    growth: float = 0.0015
-    width: float = 0.002
+    width: float = 0.001
     sure: float = 0.9
-    doubt: float = 0.02
+    doubt: float = 0.01
     limit: float = 5.0
     beyond_doubt: float = 1.5
     shell: float = 0.006
@@ -209,9 +233,11 @@ class CompletionConfig:
 class FittedMapConfig:
     """A Hilbert map whose hinge points fill the box of what was seen and of the hypotheses.
 
-    hinges : about so many, no closer than `least_spacing`; margin : of the box
-    behind : observed surface points are taken this far behind the surface, where they are inside
+    hinges : about so many, no closer than `least_spacing`; margin : of the box, metres
+    behind : metres behind and in front of the seen surface where it is sampled
     start : standard deviation of the particles' first weights
+    stiffness : lambda_norm is so many times as large for a placed shape, which is known better than
+    a completed one; least_weight : hypotheses that weigh less are left out
     """
 
     hinges: int = 1000
@@ -226,6 +252,8 @@ class FittedMapConfig:
     behind: float = 0.004
     lambda_observed: float = 50.0
     lambda_norm: float = 0.5
+    stiffness: float = 8.0
+    least_weight: float = 0.01
 
 
 @dataclass(frozen=True)
@@ -237,6 +265,7 @@ class HypothesesConfig:
     mean: MeanConfig = field(default_factory=MeanConfig)
     completion: CompletionConfig = field(default_factory=CompletionConfig)
     map: FittedMapConfig = field(default_factory=FittedMapConfig)
+    sensor: SensorConfig = field(default_factory=SensorConfig)
 
 
 @dataclass(frozen=True)

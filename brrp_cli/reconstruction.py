@@ -57,12 +57,14 @@ class Surface:
 
     vertices : (n, 3) float64, metres, camera frame; faces : (m, 3) int64; uncertainty : (n,)
     float32, the posterior's uncertainty at each vertex, in `uncertainty_unit`.
+    colours : (n, 3) uint8, RGB at the vertices; None where nobody has coloured them yet
     """
 
     vertices: NDArray[np.float64]
     faces: NDArray[np.int64]
     uncertainty: NDArray[np.float32]
     uncertainty_unit: str
+    colours: NDArray[np.uint8] | None = None
 
     def as_trimesh(self) -> trimesh.Trimesh:
         """The same as a trimesh, vertices in the same order."""

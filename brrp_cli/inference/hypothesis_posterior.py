@@ -3,52 +3,109 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
+import torch
 from numpy.typing import NDArray
 
-from brrp_cli.inference.posterior import HilbertPosterior, mean_occupancy
-from brrp_cli.inference.prior_mean import PriorMeanGrid
+from brrp_cli.inference.placed_shape import PlacedShape
+from brrp_cli.inference.posterior import HilbertPosterior
 from brrp_cli.reconstruction import METRES, Axes
 
 # Standard deviation of the logistic distribution over 4: a surface whose occupancy is a logistic
 # function of the way across it has this over the gradient as standard deviation of its place.
-LOGISTIC = np.pi / np.sqrt(3) / 4
+LOGISTIC_DEVIATION = np.pi / np.sqrt(3) / 4
 # No surface is less certain than this, metres.
 LARGEST = 0.05
 # Half of the difference quotients' step, metres.
 STEP = 0.001
 
 
+class MeanFunction(Protocol):
+    """What a hypothesis says before the observation corrects it: a logit of occupancy m(x)."""
+
+    @property
+    def bounds(self) -> NDArray[np.float64]:
+        """(2, 3) metres, camera frame: the box that holds its shape."""
+
+    def logits(self, points: NDArray[np.floating]) -> NDArray[np.float32]:
+        """m (n,) at points (n, 3), metres, camera frame."""
+
+    def volume(self, axes: Axes) -> NDArray[np.float32]:
+        """m (nx, ny, nz) on a grid of camera-frame coordinates, metres."""
+
+
 @dataclass(frozen=True)
 class HypothesisPosterior:
     """Particles (hypothesis, weights) over sigmoid(m(x) + w . phi(x)).
 
-    mean : m of C hypotheses; which : (P,) the hypothesis of each particle; correction : the
-    particles' weights
+    means : m of C hypotheses; which : (P,) the hypothesis of each particle; shares : (P,), sum 1,
+    the weight of each particle; correction : the particles' weights w; box : (2, 3) metres, camera
+    frame, outside of which nothing is occupied
     """
 
-    mean: PriorMeanGrid
+    means: tuple[MeanFunction, ...]
     which: NDArray[np.int64]
+    shares: NDArray[np.float64]
     correction: HilbertPosterior
+    box: NDArray[np.float64]
 
     @property
     def bounds(self) -> NDArray[np.float64]:
-        """(2, 3) metres, camera frame: the grid's box, outside of which nothing is occupied."""
-        return np.stack([self.mean.lower, self.mean.upper])
+        """(2, 3) metres, camera frame."""
+        return self.box
+
+    @property
+    def weights(self) -> NDArray[np.float64]:
+        """(C,) weight of each hypothesis, sum 1."""
+        return np.bincount(self.which, self.shares, len(self.means)).astype(np.float64)
+
+    @property
+    def dominant(self) -> int | None:
+        """The placed shape that explains the object: the most probable placement, if placements of
+        its object together weigh more than a half."""
+        of: dict[str, float] = {}
+        for mean, weight in zip(self.means, self.weights, strict=True):
+            if isinstance(mean, PlacedShape):
+                of[mean.name] = of.get(mean.name, 0.0) + float(weight)
+        best = max(of, key=lambda name: of[name], default=None)
+        if best is None or of[best] <= 0.5:
+            return None
+        mine = [isinstance(m, PlacedShape) and m.name == best for m in self.means]
+        return int(np.argmax(np.where(mine, self.weights, -1)))
 
     def logits(self, points: NDArray[np.floating]) -> NDArray[np.float32]:
         """m + w . phi (P, n) at points (n, 3), metres, camera frame."""
-        return self.mean.logits(points)[self.which] + self.correction.logits(points)
+        means = np.stack([mean.logits(points) for mean in self.means])
+        return np.asarray(means[self.which] + self.correction.logits(points))
 
     def probability(self, points: NDArray[np.floating]) -> NDArray[np.float32]:
-        """Occupancy probability (n,): mean over particles of sigmoid(m + w . phi)."""
-        return mean_occupancy(self.logits(points))
+        """Occupancy probability (n,): mean over particles of sigmoid(m + w . phi); 0 out of
+        bounds."""
+        points = np.asarray(points)
+        inside = ((points >= self.box[0]) & (points <= self.box[1])).all(axis=1)
+        found = np.zeros(len(points), np.float32)
+        found[inside] = self.mean_occupancy(self.logits(points[inside]))
+        return found
 
     def probability_volume(self, axes: Axes) -> NDArray[np.float32]:
         """Occupancy probability (nx, ny, nz) on a grid of camera-frame coordinates, metres."""
-        logits = self.mean.volume(axes)[self.which] + self.correction.logit_volume(axes)
-        return mean_occupancy(logits)
+        return np.tensordot(self.shares, self.particle_volumes(axes), axes=1).astype(np.float32)
+
+    def particle_volumes(self, axes: Axes) -> NDArray[np.float32]:
+        """Occupancy (P, nx, ny, nz) of each particle on a grid of camera-frame coordinates,
+        metres."""
+        logits = self.correction.logit_volume(axes)
+        for number, mean in enumerate(self.means):
+            logits[self.which == number] += mean.volume(axes)
+        return np.asarray(torch.from_numpy(logits).sigmoid_().numpy())
+
+    def mean_occupancy(self, logits: NDArray[np.floating]) -> NDArray[np.float32]:
+        """Weighted mean over particles of sigmoid(logits), for logits (P, ...)."""
+        occupancy = torch.sigmoid(torch.from_numpy(np.asarray(logits, dtype=np.float32)))
+        shares = torch.from_numpy(self.shares.astype(np.float32))
+        return np.asarray(torch.tensordot(shares, occupancy, dims=1).numpy())
 
     def uncertainty(self, points: NDArray[np.floating]) -> NDArray[np.float32]:
         """Variance (n,) of occupancy, p (1 - p): at most 0.25, between the hypotheses' surfaces."""
@@ -65,9 +122,15 @@ class HypothesisPosterior:
 
         Occupancy falls from 1 to 0 across a surface: the more slowly, the less is known where.
         """
-        slope = [
+        gradient = [
             (self.probability(vertices + step) - self.probability(vertices - step)) / (2 * STEP)
             for step in np.eye(3) * STEP
         ]
-        steepness = np.maximum(np.linalg.norm(slope, axis=0), LOGISTIC / LARGEST)
-        return np.asarray(LOGISTIC / steepness, dtype=np.float32)
+        return deviation(np.linalg.norm(gradient, axis=0))
+
+
+def deviation(steepness: NDArray[np.floating]) -> NDArray[np.float32]:
+    """Standard deviation (n,), metres, of the place of a surface across which occupancy falls by
+    `steepness` (n,), 1/metre."""
+    steepest = np.maximum(steepness, LOGISTIC_DEVIATION / LARGEST)
+    return np.asarray(LOGISTIC_DEVIATION / steepest, dtype=np.float32)

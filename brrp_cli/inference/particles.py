@@ -18,9 +18,8 @@ def particle_volumes(posterior: OccupancyPosterior, axes: Axes) -> NDArray[np.fl
     V-PRISM and PointSDF have no particles: P is 1, and that is the mean.
     """
     if isinstance(posterior, HypothesisPosterior):
-        logits = posterior.mean.volume(axes)[posterior.which]
-        logits = logits + posterior.correction.logit_volume(axes)
-    elif isinstance(posterior, HilbertPosterior):
+        return posterior.particle_volumes(axes)
+    if isinstance(posterior, HilbertPosterior):
         logits = posterior.logit_volume(axes)
     else:
         return posterior.probability_volume(axes)[None]

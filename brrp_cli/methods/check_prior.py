@@ -25,16 +25,3 @@ def check_prior(prior: Prior, config: Config) -> None:
             found="; ".join(lines),
             fix="build the prior anew, or use the configuration that it was built for",
         )
-    if config.hypotheses is not None and "distances" not in prior.parameters:
-        raise no_distances(prior.path)
-
-
-def no_distances(where: object) -> PriorError:
-    """The message for a prior, or an object of one, that an older brrp built."""
-    return PriorError(
-        "The prior holds no distances to its objects' surfaces",
-        where=where,
-        expected="a prior of this version of brrp",
-        found="one that an older brrp built",
-        fix="run brrp build-prior MESHES --overwrite, or pass --preset paper",
-    )

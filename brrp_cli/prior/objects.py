@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from brrp_cli.descriptors.descriptor import Appearance
 from brrp_cli.descriptors.fpfh import FeatureCloud
-from brrp_cli.prior.distance_field import DistanceField
+from brrp_cli.prior.shape import StoredShape
 
 
 @dataclass(frozen=True)
@@ -38,8 +38,8 @@ class PriorObject:
         base_scale * scale: metres, centred on the bounding box
     poses : resting poses, most probable first
     record : how it was made (repair, sample mix, original size); plain JSON
-    appearance : what it looks like; None in a prior of an older brrp
-    distances : signed distances to its surface, normalised; None in a prior of an older brrp
+    appearance : what it looks like
+    shape : its closed mesh with colours, and signed distances; normalised
     """
 
     name: str
@@ -53,5 +53,5 @@ class PriorObject:
     clouds: dict[float, FeatureCloud]
     poses: list[RestingPose]
     record: dict[str, Any]
-    appearance: Appearance | None = None
-    distances: DistanceField | None = None
+    appearance: Appearance
+    shape: StoredShape

@@ -1,17 +1,12 @@
-"""Prior mean functions of a Hilbert map: what a hypothesis says before the observation corrects it.
-
-A hypothesis about an object is a logit of occupancy m(x). With it the map is
-sigmoid(m(x) + w . phi(x)): the weights are left with what the hypothesis does not explain, and a
-thin wall needs no hinge points of its own. Each m is kept on a grid in the camera frame.
+"""The prior mean function of an object that none of the stored ones explains, and the space that it
+cannot be in.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import binary_dilation, map_coordinates, maximum_filter, minimum_filter
+from scipy.ndimage import binary_dilation, maximum_filter, minimum_filter
 
 from brrp_cli.completion.network import fitted
 from brrp_cli.completion.point_features import point_features
@@ -20,68 +15,12 @@ from brrp_cli.config import MeanConfig
 from brrp_cli.frames.frame import BACKGROUND, Frame
 from brrp_cli.frames.projection import at_pixels, depth_behind
 from brrp_cli.observation.support_plane import Plane
-from brrp_cli.reconstruction import Axes
 
 Array = NDArray[np.float64]
 Floats = NDArray[np.float32]
 
 # Metres before the measured depth that still count as the seen surface.
 SHELL_BEFORE = 0.001
-
-
-@dataclass(frozen=True)
-class PriorMeanGrid:
-    """Logits at the nodes lower + spacing * (i, j, k), metres, camera frame, of C hypotheses.
-
-    lower : (3,); spacing : > 0; values : (C, nx, ny, nz) float16; outside : logit off the grid
-    """
-
-    lower: Array
-    spacing: float
-    values: NDArray[np.float16]
-    outside: float
-
-    @property
-    def upper(self) -> Array:
-        """(3,), the last node."""
-        return np.asarray(self.lower + self.spacing * (np.array(self.values.shape[1:]) - 1))
-
-    def logits(self, points: NDArray[np.floating]) -> NDArray[np.float32]:
-        """(C, n) at points (n, 3), metres, camera frame; trilinear."""
-        at = ((np.asarray(points, dtype=np.float64) - self.lower) / self.spacing).T
-        return np.stack(
-            [
-                map_coordinates(
-                    each.astype(np.float32), at, order=1, mode="constant", cval=self.outside
-                )
-                for each in self.values
-            ]
-        )
-
-    def volume(self, axes: Axes) -> NDArray[np.float32]:
-        """(C, nx, ny, nz) on another grid along the camera's axes."""
-        nodes = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
-        found = self.logits(nodes.reshape(-1, 3))
-        return found.reshape(-1, *nodes.shape[:3])
-
-
-def grid_over(box: Array, config: MeanConfig) -> tuple[Array, float, Array]:
-    """Lower node (3,), spacing and nodes (nx, ny, nz, 3) of a grid over a box (2, 3) with about
-    `config.nodes` nodes."""
-    spacing = float((np.prod(box[1] - box[0]) / config.nodes) ** (1 / 3))
-    shape = np.ceil((box[1] - box[0]) / spacing).astype(np.int64) + 1
-    axes = [low + spacing * np.arange(n) for low, n in zip(box[0], shape, strict=True)]
-    return box[0].copy(), spacing, np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
-
-
-def shape_logits(distance: Array, alignment_score: float, config: MeanConfig) -> Array:
-    """Logits of a placed shape, from signed distances, metres: -(d - growth) / width, limited.
-
-    The less the frame says for the placement, the softer its surface.
-    """
-    width = config.width + config.doubt * max(0.0, config.sure - alignment_score)
-    logits = np.clip((config.growth - distance) / width, -config.limit, config.limit)
-    return np.asarray(logits)
 
 
 def completed_grid(
