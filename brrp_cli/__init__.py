@@ -19,26 +19,26 @@ if TYPE_CHECKING:
     from brrp_cli.frames.build import make_frame as make_frame
     from brrp_cli.frames.npz import load_frame as load_frame
     from brrp_cli.frames.readers import read_frame as read_frame
-    from brrp_cli.frames.segment import segment as segment
-    from brrp_cli.inference.posterior_file import open_posterior as open_posterior
     from brrp_cli.prior.store import open_prior as open_prior
-    from brrp_cli.surface.results import write_results as write_results
-    from brrp_cli.warm import Reconstructor as Reconstructor
+    from brrp_cli.results.posterior_file import open_posterior as open_posterior
+    from brrp_cli.results.write import write_results as write_results
+    from brrp_cli.segmentation.segment import segment as segment
+    from brrp_cli.session import Reconstructor as Reconstructor
 
 # Names are imported when they are used, so that `brrp --help` does not wait for torch.
 _HOMES = {
     "BrrpError": "brrp_cli.errors",
     "Reconstruction": "brrp_cli.api",
-    "Reconstructor": "brrp_cli.warm",
+    "Reconstructor": "brrp_cli.session",
     "load_frame": "brrp_cli.frames.npz",
     "make_frame": "brrp_cli.frames.build",
-    "open_posterior": "brrp_cli.inference.posterior_file",
+    "open_posterior": "brrp_cli.results.posterior_file",
     "open_prior": "brrp_cli.prior.store",
     "preset": "brrp_cli.config",
     "read_frame": "brrp_cli.frames.readers",
     "reconstruct": "brrp_cli.api",
-    "segment": "brrp_cli.frames.segment",
-    "write_results": "brrp_cli.surface.results",
+    "segment": "brrp_cli.segmentation.segment",
+    "write_results": "brrp_cli.results.write",
 }
 
 __all__ = ["__version__", *_HOMES]

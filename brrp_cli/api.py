@@ -20,13 +20,13 @@ from brrp_cli.errors import BrrpError, PriorError, WeightsError
 from brrp_cli.files import sha256_file
 from brrp_cli.finite import check_object
 from brrp_cli.frames.frame import BACKGROUND, Frame
-from brrp_cli.frames.observe import ObjectObservation, observe
-from brrp_cli.frames.plane import Plane
-from brrp_cli.methods.base import FAILED, NO_SURFACE, OK, TOO_FEW_POINTS, ObjectReconstruction
 from brrp_cli.methods.check_prior import check_prior
 from brrp_cli.methods.registry import METHODS, RECONSTRUCTING
+from brrp_cli.observation.ray_samples import ObjectObservation, observe
+from brrp_cli.observation.support_plane import Plane
 from brrp_cli.prior.store import Prior
 from brrp_cli.progress import progress
+from brrp_cli.reconstruction import FAILED, NO_SURFACE, OK, TOO_FEW_POINTS, ObjectReconstruction
 from brrp_cli.retrieval.checked import CheckedRetriever
 from brrp_cli.threads import cores, in_threads
 
@@ -112,8 +112,8 @@ def reconstruct(
         return _pointsdf(frame, Path(weights), config, seed, pick_device(device))
     if prior is None:
         return _vprism(frame, config, seed)
-    from brrp_cli.methods.brrp import reconstruct_object
-    from brrp_cli.methods.hypothesise import reconstruct_by_hypotheses
+    from brrp_cli.methods.brrp_default import reconstruct_by_hypotheses
+    from brrp_cli.methods.brrp_paper import reconstruct_object
     from brrp_cli.retrieval.choose import choose_retriever
 
     check_prior(prior, config)
@@ -183,8 +183,8 @@ def _check_method(
 
 def _vprism(frame: Frame, config: Config, seed: int) -> Reconstruction:
     """The frame's objects in one map, without a prior; surfaces as `config` asks for them."""
-    from brrp_cli.frames.scene_samples import sample_scene
-    from brrp_cli.methods.vprism import reconstruct_scene
+    from brrp_cli.methods.vprism.method import reconstruct_scene
+    from brrp_cli.observation.scene_samples import sample_scene
 
     own = VPrismConfig()
     start = time.perf_counter()
@@ -216,10 +216,10 @@ def _pointsdf(
 ) -> Reconstruction:
     """The frame's objects by a trained network; surfaces as `config` asks for them, but at the
     method's own level."""
-    from brrp_cli.frames.observe import box_center
-    from brrp_cli.frames.plane import fit_plane
-    from brrp_cli.methods.pointsdf import reconstruct_pointsdf
-    from brrp_cli.pointsdf.weights import load_weights
+    from brrp_cli.methods.pointsdf.method import reconstruct_pointsdf
+    from brrp_cli.methods.pointsdf.weights import load_weights
+    from brrp_cli.observation.ray_samples import box_center
+    from brrp_cli.observation.support_plane import fit_plane
 
     own = PointSDFConfig()
     loaded = load_weights(weights)

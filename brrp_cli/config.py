@@ -90,7 +90,7 @@ class SurfaceConfig:
 
 
 @dataclass(frozen=True)
-class EvidenceConfig:
+class VerificationConfig:
     """What a frame says of a placement: shares of observed points and of model surface.
 
     near : standard deviation of the Gaussian of observed points' distances to the model; far : an
@@ -115,9 +115,9 @@ class SearchConfig:
     `coarse` of them slide `coarse_steps` steps with `coarse_points` observed points, which reach
     the surface from `coarse_distance`; the best `middle` of those, and then the best `fine`, slide
     again, each with more points. The best `rescaled` are then tried at `scales` times the true
-    size; evidence falls by scale_cost * ln(scale)^2. No other size is tried where evidence reaches
-    `settled`, and nothing is refined further where none of the placements reaches `hopeless` or
-    all stay `beaten` behind another model's.
+    size; the alignment score falls by scale_cost * ln(scale)^2. No other size is tried where it
+    reaches `settled`, and nothing is refined further where none of the placements reaches
+    `hopeless` or all stay `beaten` behind another model's.
     Of placements whose surfaces lie within `distinct` metres the best is kept, `kept` in all.
     """
 
@@ -147,20 +147,20 @@ class SearchConfig:
     settled: float = 0.9
     distinct: float = 0.0015
     kept: int = 6
-    evidence: EvidenceConfig = field(default_factory=EvidenceConfig)
+    alignment_score: VerificationConfig = field(default_factory=VerificationConfig)
 
 
 @dataclass(frozen=True)
 class WeighConfig:
-    """Weights of hypotheses: P(c|R) exp(sharpness * evidence).
+    """Weights of hypotheses: P(c|R) exp(sharpness * alignment score).
 
-    The hypothesis that the object is none of the stored ones has the evidence `unknown_evidence`
-    and a probability within [least_unknown, most_unknown]; no hypothesis counts as less probable
-    than `least_share`, since a retriever may be wrong.
+    The hypothesis that the object is none of the stored ones has the score
+    `unknown_score` and a probability within [least_unknown, most_unknown]; no hypothesis counts as
+    less probable than `least_share`, since a retriever may be wrong.
     """
 
     sharpness: float = 40.0
-    unknown_evidence: float = 0.7
+    unknown_score: float = 0.7
     least_unknown: float = 0.1
     most_unknown: float = 0.9
     least_share: float = 1e-3
@@ -168,12 +168,12 @@ class WeighConfig:
 
 @dataclass(frozen=True)
 class MeanConfig:
-    """Mean functions of hypotheses, logits on a lattice of about `nodes` nodes.
+    """Mean functions of hypotheses, logits on a grid of about `nodes` nodes.
 
-    A placed shape is -(signed distance - growth) / width, limited to +-limit; evidence under `sure`
-    widens it by `doubt` for each unit. An object that none explains is completed by a network,
-    which is asked at every node where the coarse ones around are not all `beyond_doubt`; its logit
-    is `crust_logit` at least for `crust` metres behind what is seen of it. Space is empty that lies
+    A placed shape is -(signed distance - growth) / width, limited to +-limit; an alignment
+    score under `sure` widens it by `doubt` for each unit. An object that none explains is completed
+    by a network, which is evaluated at every node where the coarse ones around are not all
+    `beyond_doubt`; its logit is `shell_logit` at least for `shell` metres behind what is seen of it. Space is empty that lies
     more than `carve_depth` in front of the measured depth, or `carve_plane` below the plane, or
     less than `carve_behind` behind what is no object's and more than `carve_pixels` from the mask.
     """
@@ -185,8 +185,8 @@ class MeanConfig:
     doubt: float = 0.02
     limit: float = 5.0
     beyond_doubt: float = 1.5
-    crust: float = 0.006
-    crust_logit: float = 1.0
+    shell: float = 0.006
+    shell_logit: float = 1.0
     carve_depth: float = 0.006
     carve_plane: float = 0.004
     carve_behind: float = 0.01

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from brrp_cli.errors import BrrpError
 
 if TYPE_CHECKING:
-    from brrp_cli.methods.base import ObjectReconstruction
+    from brrp_cli.reconstruction import ObjectReconstruction
 
 
 def check_finite(stage: str, **values: ArrayLike | None) -> None:
@@ -41,6 +41,6 @@ def check_object(item: ObjectReconstruction) -> None:
             T_cam_object=found.T_cam_object,
             scale=found.scale,
             fitness=found.fitness,
-            evidence=found.evidence,
+            alignment_score=found.alignment_score,
             weight=found.weight,
         )

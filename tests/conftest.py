@@ -2,6 +2,8 @@ import logging
 
 import pytest
 
+pytest_plugins = ["pointsdf_fixtures", "table_fixtures"]
+
 
 @pytest.fixture(scope="session", autouse=True)
 def no_clip_of_the_users(tmp_path_factory: pytest.TempPathFactory):

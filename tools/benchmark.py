@@ -38,13 +38,13 @@ from brrp_cli.config import preset
 from brrp_cli.errors import BrrpError
 from brrp_cli.frames.frame import Frame
 from brrp_cli.frames.npz import save_frame
-from brrp_cli.frames.observe import observe
 from brrp_cli.frames.readers import read_frame
+from brrp_cli.observation.ray_samples import observe
 from brrp_cli.prior.store import Prior, open_prior
 from brrp_cli.retrieval.choose import choose_retriever
+from brrp_cli.session import Reconstructor
 from brrp_cli.threads import cores
 from brrp_cli.version import __version__
-from brrp_cli.warm import Reconstructor
 
 MADE = "made, four objects"
 
@@ -219,7 +219,7 @@ def measure_growth(frame: Frame, prior: Prior, options: Options, quick: bool) ->
 
 
 def _starter() -> Path:
-    from brrp_cli.demo.starter import starter_prior
+    from brrp_cli.prior.build.starter import starter_prior
 
     return starter_prior()
 

@@ -24,8 +24,8 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from speed.measure import cold, run, spread
 
 from brrp_cli.errors import BrrpError
-from brrp_cli.prior.find import MeshSource, find_meshes
-from brrp_cli.prior.make import make_object
+from brrp_cli.prior.build.find_meshes import MeshSource, find_meshes
+from brrp_cli.prior.build.make_object import make_object
 from brrp_cli.prior.parameters import BuildParameters
 from brrp_cli.threads import cores, in_threads
 

@@ -30,8 +30,10 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from brrp_cli.errors import BrrpError, PriorError
 from brrp_cli.files import atomic_folder, sha256_file
+from brrp_cli.prior.appearance_file import sidecar_file
+from brrp_cli.prior.appearance_index import open_appearance_index
+from brrp_cli.prior.build.shard_plan import MEAN_OBJECTS, shard_file
 from brrp_cli.prior.index import read_index
-from brrp_cli.prior.looks import open_looks
 from brrp_cli.prior.manifest import (
     FILE,
     ObjectEntry,
@@ -39,8 +41,6 @@ from brrp_cli.prior.manifest import (
     read_manifest,
     write_manifest,
 )
-from brrp_cli.prior.plan import MEAN_OBJECTS, shard_file
-from brrp_cli.prior.sidecar import sidecar_file
 from brrp_cli.prior.store import Prior, open_prior
 
 CHUNK = 1_000
@@ -101,7 +101,7 @@ def copy_prior(prior: Prior, count: int, folder: Path, strange: bool) -> None:
         ),
     )
     # What a build leaves too.
-    open_looks(folder, read_index(folder), lambda: read_manifest(folder))
+    open_appearance_index(folder, read_index(folder), lambda: read_manifest(folder))
 
 
 def _copies(objects: list[ObjectEntry]) -> Iterator[tuple[ObjectEntry, ObjectEntry]]:

@@ -6,7 +6,7 @@
 Scenes of objects that the prior holds and of others, made with `tools/make_scenes.py --noise
 structured-light --light varied`; every view counts. What is minimised is the mean of -ln P(what it
 is | R), where what is not in the prior is one more class. Printed are the values for WEIGHTS in
-brrp_cli/retrieval/belief.py, and what becomes of each set.
+brrp_cli/retrieval/score_fusion.py, and what becomes of each set.
 """
 
 from __future__ import annotations
@@ -26,13 +26,13 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from brrp_cli.config import preset
 from brrp_cli.errors import BrrpError
 from brrp_cli.evaluation.calibration import expected_calibration_error
-from brrp_cli.evaluation.scenes import find_scenes
+from brrp_cli.ground_truth.scenes import find_scenes
 from brrp_cli.prior.store import Prior, open_prior
 from brrp_cli.progress import progress
 from brrp_cli.retrieval.appearance import AppearanceRetriever
 from brrp_cli.retrieval.base import unknown
-from brrp_cli.retrieval.belief import WEIGHTS, Evidence, Weights, believe
-from brrp_cli.retrieval.lights import lights, local_lights, log_prior
+from brrp_cli.retrieval.illuminants import lights, local_lights, log_prior
+from brrp_cli.retrieval.score_fusion import WEIGHTS, Similarity, Weights, believe
 
 LARGE = 500  # visible pixels
 
@@ -42,7 +42,7 @@ class View:
     """What one view shows: evidence, visible pixels and the true row (-1: not in the prior)."""
 
     group: str
-    evidence: list[Evidence]
+    evidence: list[Similarity]
     pixels: list[int]
     truth: list[int]
 

@@ -36,18 +36,18 @@ from tqdm import tqdm
 # The script also runs from a checkout that is not installed.
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from brrp_cli.completion.around import COUNT, WHOLE, lengths
 from brrp_cli.completion.network import Network
-from brrp_cli.completion.part import seen_part
+from brrp_cli.completion.point_features import COUNT, WHOLE, point_features
+from brrp_cli.completion.visible_part import visible_part
 from brrp_cli.config import HypothesesConfig, preset
 from brrp_cli.dependencies import import_open3d
 from brrp_cli.evaluation.perturb import shift_masks, with_noise
-from brrp_cli.evaluation.scenes import Scene, find_scenes
-from brrp_cli.evaluation.truth import TrueObject, true_mesh
-from brrp_cli.frames.observe import observe
 from brrp_cli.geometry import transform_points
-from brrp_cli.inference.mean import empty_space
-from brrp_cli.prior.repair import repair
+from brrp_cli.ground_truth.scenes import Scene, find_scenes
+from brrp_cli.ground_truth.truth import TrueObject, true_mesh
+from brrp_cli.inference.prior_mean import empty_space
+from brrp_cli.observation.ray_samples import observe
+from brrp_cli.prior.build.repair import repair
 from brrp_cli.raycast import raycasting_scene
 from brrp_cli.seeds import child_rng
 
@@ -58,16 +58,16 @@ FAR_MARGIN = 0.2  # metres
 HIDDEN = 64
 BATCH = 4096
 MIN_PIXELS = 100
-# Standard deviations of what is added to inputs, in theirs. An object's own lengths, the same at
+# Standard deviations of what is added to inputs, in theirs. An object's own features, the same at
 # all of its points, would else be learnt by heart.
 JITTER, JITTER_WHOLE = 0.03, 0.1
 
 
 @dataclass(frozen=True)
 class Examples:
-    """lengths (n, F), inside (n,) of the points of some objects."""
+    """point_features (n, F), inside (n,) of the points of some objects."""
 
-    lengths: NDArray[np.float32]
+    point_features: NDArray[np.float32]
     inside: NDArray[np.bool_]
 
 
@@ -114,7 +114,7 @@ def look(scene: Scene, data_root: Path, only: tuple[str, ...], views: int, seed:
                 observation.points
             ) < MIN_PIXELS:
                 continue
-            part = seen_part(
+            part = visible_part(
                 observation.points, frame, object_id, observed.plane, _hypotheses().completion
             )
             margin = _hypotheses().map.margin
@@ -132,7 +132,7 @@ def look(scene: Scene, data_root: Path, only: tuple[str, ...], views: int, seed:
             scale = float(np.cbrt(np.linalg.det(true.T_world_object[:3, :3])))
             solid = _solid(true.mesh_path, data_root)
             growth = _hypotheses().mean.growth / scale
-            found.append(Examples(lengths(points, part), _inside(in_file, solid, growth)))
+            found.append(Examples(point_features(points, part), _inside(in_file, solid, growth)))
     return _together(found)
 
 
@@ -140,7 +140,7 @@ def _together(found: list[Examples]) -> Examples:
     none = Examples(np.zeros((0, COUNT), dtype=np.float32), np.zeros(0, dtype=bool))
     found = [none, *found]
     return Examples(
-        np.concatenate([each.lengths for each in found]),
+        np.concatenate([each.point_features for each in found]),
         np.concatenate([each.inside for each in found]),
     )
 
@@ -161,8 +161,11 @@ def fit(examples: Examples, held: Examples, epochs: int, seed: int) -> Network:
     """Adam with a rate that falls to zero; binary cross-entropy."""
     generator = torch.Generator().manual_seed(seed)
     torch.manual_seed(seed)
-    middle, spread = examples.lengths.mean(axis=0), examples.lengths.std(axis=0) + 1e-3
-    x = torch.from_numpy((examples.lengths - middle) / spread)
+    middle, spread = (
+        examples.point_features.mean(axis=0),
+        examples.point_features.std(axis=0) + 1e-3,
+    )
+    x = torch.from_numpy((examples.point_features - middle) / spread)
     y = torch.from_numpy(examples.inside.astype(np.float32))
     net = torch.nn.Sequential(
         torch.nn.Linear(x.shape[1], HIDDEN),
@@ -194,7 +197,7 @@ def fit(examples: Examples, held: Examples, epochs: int, seed: int) -> Network:
 
 def score(network: Network, examples: Examples) -> str:
     """Mean negative log likelihood and intersection over union of all points."""
-    logits = network.logits(examples.lengths).astype(np.float64)
+    logits = network.logits(examples.point_features).astype(np.float64)
     nll = np.logaddexp(0, np.where(examples.inside, -logits, logits)).mean()
     found = logits > 0
     union = (found | examples.inside).sum()

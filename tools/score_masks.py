@@ -21,9 +21,9 @@ from PIL import Image
 from scipy.optimize import linear_sum_assignment
 
 from brrp_cli.errors import BrrpError
-from brrp_cli.evaluation.scenes import find_scenes
-from brrp_cli.frames.picture import draw_masks
-from brrp_cli.frames.segment import segment
+from brrp_cli.ground_truth.scenes import find_scenes
+from brrp_cli.segmentation.mask_picture import draw_masks
+from brrp_cli.segmentation.segment import segment
 
 MIN_PIXELS = 150
 

@@ -25,11 +25,11 @@ from brrp_cli.frames.readers import read_frame
 from brrp_cli.prior.store import open_prior
 from brrp_cli.retrieval.appearance import AppearanceRetriever
 from brrp_cli.retrieval.base import top_k
-from brrp_cli.retrieval.belief import believe
-from brrp_cli.retrieval.lights import lights, local_lights, log_prior
-from brrp_cli.retrieval.likeness import evidence, lit_histograms
-from brrp_cli.retrieval.seen import see_object
+from brrp_cli.retrieval.illuminants import lights, local_lights, log_prior
+from brrp_cli.retrieval.observed_appearance import see_object
+from brrp_cli.retrieval.score_fusion import believe
 from brrp_cli.retrieval.shortlist import Shortlist
+from brrp_cli.retrieval.similarity import alignment_score, lit_histograms
 
 
 @click.command()
@@ -62,7 +62,7 @@ def main(prior_path: Path, frame_path: Path) -> None:
         histograms = lit_histograms(seen, gains)
         clock.append(time.process_time())
         rows = shortlist.rows(seen, histograms)
-        found.append(evidence(seen, histograms, looks.rows(rows), rows, len(gains)))
+        found.append(alignment_score(seen, histograms, looks.rows(rows), rows, len(gains)))
         clock.append(time.process_time())
         for stage, spent in zip(seconds, np.diff(clock), strict=True):
             seconds[stage] += float(spent)

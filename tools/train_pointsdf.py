@@ -38,10 +38,10 @@ from tqdm import tqdm
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from brrp_cli.errors import BrrpError
-from brrp_cli.evaluation.evaluate import find_data_root
-from brrp_cli.evaluation.scenes import find_scenes
-from brrp_cli.evaluation.true_meshes import truth_cache
-from brrp_cli.pointsdf.examples import TRUTHS, Recipe, make_examples, read_examples
+from brrp_cli.evaluation.request import find_data_root
+from brrp_cli.ground_truth.scenes import find_scenes
+from brrp_cli.ground_truth.true_meshes import truth_cache
+from brrp_cli.training.examples import TRUTHS, Recipe, make_examples, read_examples
 
 
 @click.command()
@@ -100,8 +100,8 @@ def main(
 ) -> None:
     """Train on SCENES, or on the examples that are in OUTPUT already."""
     from brrp_cli.api import pick_device
-    from brrp_cli.pointsdf.network import NetworkConfig
-    from brrp_cli.pointsdf.training import Training, TrainingConfig, split
+    from brrp_cli.methods.pointsdf.network import NetworkConfig
+    from brrp_cli.training.pointsdf import Training, TrainingConfig, split
 
     began = monotonic()
     try:

@@ -11,7 +11,7 @@ from brrp_cli.errors import BrrpError
 from brrp_cli.prior.locate import output_prior
 from brrp_cli.prior.parameters import UNITS, BuildParameters
 from brrp_cli.progress import note, quiet
-from brrp_cli.retrieval.clip_files import clip_folder
+from brrp_cli.retrieval.clip.model_files import clip_folder
 
 
 @click.command("build-prior")
@@ -64,7 +64,7 @@ def command(
 
     Exit codes: 0 all meshes are in, 3 some failed, 1 none.
     """
-    from brrp_cli.prior.build import build_prior
+    from brrp_cli.prior.build.build import build_prior
 
     folder, how = output_prior(out)
     note(f"Prior: {folder} ({how})")
@@ -99,7 +99,7 @@ def _keep_descriptions(folder: Path, clip_dir: Path | None) -> None:
     if clip is None:
         return
     from brrp_cli.prior.store import open_prior
-    from brrp_cli.retrieval.clip import keep_descriptions
+    from brrp_cli.retrieval.clip.retriever import keep_descriptions
 
     try:
         keep_descriptions(open_prior(folder), clip)

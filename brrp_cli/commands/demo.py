@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from brrp_cli.api import Reconstruction
     from brrp_cli.demo.scene import DemoScene
     from brrp_cli.demo.score import Score
-    from brrp_cli.methods.base import ObjectReconstruction
+    from brrp_cli.reconstruction import ObjectReconstruction
 
 SOME_FAILED = 3
 FRAME = "frame.npz"
@@ -53,12 +53,12 @@ def command(output: Path, seed: int, preset_name: str, device: str, overwrite: b
     from brrp_cli.api import reconstruct
     from brrp_cli.demo.scene import make_scene
     from brrp_cli.demo.score import score
-    from brrp_cli.demo.starter import starter_prior
     from brrp_cli.files import atomic_folder, check_writable, refuse_folder
     from brrp_cli.frames.npz import save_frame
+    from brrp_cli.prior.build.starter import starter_prior
     from brrp_cli.prior.store import open_prior
+    from brrp_cli.results.write import write_results
     from brrp_cli.retrieval.choose import choose_retriever
-    from brrp_cli.surface.results import write_results
 
     start = time.perf_counter()
     refuse_folder(output, overwrite=overwrite, mark=FRAME)

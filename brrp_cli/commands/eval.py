@@ -15,7 +15,7 @@ from brrp_cli.config import PRESETS
 from brrp_cli.methods.registry import METHODS
 from brrp_cli.progress import note
 from brrp_cli.retrieval.choose import RETRIEVERS
-from brrp_cli.retrieval.clip_files import CLIP_DIR_VARIABLE
+from brrp_cli.retrieval.clip.model_files import CLIP_DIR_VARIABLE
 
 SOME_FAILED = 3
 ABLATIONS = ("truth",)
@@ -145,7 +145,7 @@ def command(
 
     Exit codes: 0 all objects have a result, 3 some failed.
     """
-    from brrp_cli.evaluation.evaluate import Request, evaluate
+    from brrp_cli.evaluation.request import Request, evaluate
 
     check_weights(methods, weights)
     request = Request(

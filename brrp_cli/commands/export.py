@@ -14,7 +14,7 @@ from brrp_cli.progress import note
 
 if TYPE_CHECKING:
     from brrp_cli.planning.scene import PlannedObject
-    from brrp_cli.surface.stored import StoredResult
+    from brrp_cli.results.read import StoredResult
 
 FOLDER = "plan"
 CONFIDENCE = click.FloatRange(0.5, 0.999)
@@ -73,7 +73,7 @@ def command(
       brrp export out/ --collision hull
       brrp export out/ --confidence 0.95 -o plan/
     """
-    from brrp_cli.surface.stored import open_result
+    from brrp_cli.results.read import open_result
 
     if margin and confidence is None:
         raise click.UsageError("--margin grows the shapes of --confidence, so give both")

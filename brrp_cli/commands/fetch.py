@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from brrp_cli.retrieval.clip_files import CLIP_DIR_VARIABLE, clip_cache, named_clip_folder
+from brrp_cli.retrieval.clip.model_files import CLIP_DIR_VARIABLE, clip_cache, named_clip_folder
 
 PRECISIONS = {"clip": ("full", "8bit"), "masks": ("full", "4bit")}
 
@@ -70,9 +70,9 @@ def command(
 
 def _clip(precision: str, clip_dir: Path | None, source: str | None) -> None:
     from brrp_cli.fetch.fetch import fetch
-    from brrp_cli.retrieval.clip_files import find_clip_files
-    from brrp_cli.retrieval.clip_manifest import read_clip_manifest
-    from brrp_cli.retrieval.clip_text import ClipTokenizer
+    from brrp_cli.retrieval.clip.manifest import read_clip_manifest
+    from brrp_cli.retrieval.clip.model_files import find_clip_files
+    from brrp_cli.retrieval.clip.text import ClipTokenizer
 
     manifest = read_clip_manifest()
     files = manifest.files[precision]
@@ -88,7 +88,11 @@ def _clip(precision: str, clip_dir: Path | None, source: str | None) -> None:
 
 def _masks(precision: str, masks_dir: Path | None, source: str | None) -> None:
     from brrp_cli.fetch.fetch import fetch
-    from brrp_cli.grounding.mask_files import find_mask_files, masks_folder, read_mask_manifest
+    from brrp_cli.segmentation.prompted.mask_files import (
+        find_mask_files,
+        masks_folder,
+        read_mask_manifest,
+    )
 
     folder = masks_folder(masks_dir)
     brought, files = 0, []

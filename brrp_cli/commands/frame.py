@@ -43,7 +43,7 @@ def command(source: SourceOptions, segment: bool, seed: int, output: Path, overw
 
     from brrp_cli.frames.build import require_objects
     from brrp_cli.frames.npz import save_frame
-    from brrp_cli.frames.picture import write_picture
+    from brrp_cli.segmentation.mask_picture import write_picture
 
     frame = source.read()
     if makes_masks:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from brrp_cli.which_prior import locate_prior
+from brrp_cli.prior.default import locate_prior
 
 if TYPE_CHECKING:
     from brrp_cli.prior.manifest import ObjectEntry

@@ -22,7 +22,7 @@ from brrp_cli.planning.options import PlanOptions
 from brrp_cli.planning.parts import HOW, check_available
 from brrp_cli.progress import note
 from brrp_cli.retrieval.choose import RETRIEVERS, choose_retriever
-from brrp_cli.retrieval.clip_files import CLIP_DIR_VARIABLE
+from brrp_cli.retrieval.clip.model_files import CLIP_DIR_VARIABLE
 
 if TYPE_CHECKING:
     from brrp_cli.api import Reconstruction
@@ -126,8 +126,8 @@ def command(
       brrp reconstruct frame.npz --collision coacd --confidence 0.95
     """
     from brrp_cli.api import reconstruct
-    from brrp_cli.surface.results import check_output, write_results
-    from brrp_cli.surface.stored import open_result
+    from brrp_cli.results.read import open_result
+    from brrp_cli.results.write import check_output, write_results
 
     source.check()
     check_weights([method], [] if weights is None else [weights])
@@ -182,7 +182,7 @@ def make_masks(
 ) -> Frame:
     """The frame with masks made on the way; a picture of them is written beside the output."""
     from brrp_cli.frames.build import require_objects
-    from brrp_cli.frames.picture import write_picture
+    from brrp_cli.segmentation.mask_picture import write_picture
 
     if source.masks is not None:
         return require_objects(frame)
@@ -225,8 +225,8 @@ def open_retrieval(
     prior_path: Path | None, config: Config, retriever: str, clip_dir: Path | None, seed: int
 ) -> tuple[Prior, Retriever]:
     """The prior and the retriever of its objects; says which they are."""
+    from brrp_cli.prior.default import locate_prior
     from brrp_cli.prior.store import open_prior
-    from brrp_cli.which_prior import locate_prior
 
     located, how = locate_prior(prior_path)
     prior = open_prior(located)

@@ -80,10 +80,10 @@ def command(
     picture, ids = output.with_suffix(".masks.png"), output.with_suffix(".ids.png")
     refuse_existing([output, picture, ids], overwrite)
 
-    from brrp_cli.frames import edit_masks
     from brrp_cli.frames.build import require_objects
     from brrp_cli.frames.npz import save_frame
-    from brrp_cli.frames.picture import write_ids, write_picture
+    from brrp_cli.segmentation import edit_masks
+    from brrp_cli.segmentation.mask_picture import write_ids, write_picture
 
     frame = source.read()
     if again or source.prompt is not None or not frame.object_ids:

@@ -127,10 +127,10 @@ class SourceOptions:
         """
         from dataclasses import replace
 
-        from brrp_cli.frames.segment import segment
+        from brrp_cli.segmentation.segment import segment
 
         if self.prompt is None:
             return replace(frame, segmap=segment(frame, seed))
-        from brrp_cli.grounding.segment_by_prompt import PromptSegmenter
+        from brrp_cli.segmentation.prompted.segment_by_prompt import PromptSegmenter
 
         return replace(frame, segmap=PromptSegmenter(self.masks_dir)(frame, self.prompt, seed))

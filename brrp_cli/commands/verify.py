@@ -7,7 +7,7 @@ from pathlib import Path
 
 import click
 
-from brrp_cli.which_prior import locate_prior
+from brrp_cli.prior.default import locate_prior
 
 
 @click.command("verify")

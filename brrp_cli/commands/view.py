@@ -11,7 +11,7 @@ import click
 from brrp_cli.progress import note
 
 if TYPE_CHECKING:
-    from brrp_cli.surface.stored import StoredResult
+    from brrp_cli.results.read import StoredResult
 
 PAGE = "view.html"
 
@@ -44,7 +44,7 @@ def command(results: Path, output: Path | None, open_it: bool, rerun: bool) -> N
       brrp view out/ --no-open -o page.html
       brrp view out/ --rerun
     """
-    from brrp_cli.surface.stored import open_result
+    from brrp_cli.results.read import open_result
 
     stored = open_result(results)
     if rerun:

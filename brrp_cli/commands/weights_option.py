@@ -7,8 +7,8 @@ from pathlib import Path
 
 import click
 
+from brrp_cli.methods.pointsdf.weights import describe_weights
 from brrp_cli.methods.registry import METHODS
-from brrp_cli.pointsdf.weights import describe_weights
 
 
 def check_weights(methods: Sequence[str], weights: Sequence[Path]) -> None:

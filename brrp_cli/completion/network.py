@@ -1,4 +1,4 @@
-"""From lengths to the log odds that a point is inside: a small network, fitted once.
+"""From per-point features to the log odds that a point is inside: a small network, fitted once.
 
 `tools/fit_completion.py` fits it and says on what; brrp_cli/completion/weights.npz holds it.
 """
@@ -27,9 +27,9 @@ class Network:
     spread: Floats
     layers: tuple[tuple[Floats, Floats], ...]
 
-    def logits(self, lengths: Floats) -> Floats:
-        """Log odds (n,) from lengths (n, F)."""
-        x = (lengths - self.middle) / self.spread
+    def logits(self, point_features: Floats) -> Floats:
+        """Log odds (n,) from point_features (n, F)."""
+        x = (point_features - self.middle) / self.spread
         for number, (weight, bias) in enumerate(self.layers, start=1):
             x = x @ weight + bias
             if number < len(self.layers):

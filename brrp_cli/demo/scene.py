@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brrp_cli.demo.layout import camera_pose, stand_apart
+from brrp_cli.depth_noise.structured_light import add_depth_noise
 from brrp_cli.frames.build import make_frame
 from brrp_cli.frames.frame import Frame
-from brrp_cli.frames.noise import add_depth_noise
 from brrp_cli.raycast import Sight, look
 from brrp_cli.seeds import child_rng
 from brrp_cli.shapes import solids

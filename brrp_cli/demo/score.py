@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from brrp_cli.evaluation.metrics import chamfer, evaluation_grid, iou, sample_surface
+from brrp_cli.ground_truth.metrics import chamfer, evaluation_grid, iou, sample_surface
 from brrp_cli.raycast import inside
 from brrp_cli.seeds import child_rng
 

@@ -12,20 +12,20 @@ from brrp_cli.config import Config
 from brrp_cli.errors import BrrpError
 from brrp_cli.evaluation.memory import peak_megabytes, reset_peak
 from brrp_cli.evaluation.perturb import shift_masks, with_noise
-from brrp_cli.evaluation.plan import Plan, lost_row
 from brrp_cli.evaluation.rows import STAGES, Row, RowLog, variant_columns
-from brrp_cli.evaluation.scenes import Scene
 from brrp_cli.evaluation.score_object import placement_error, score_probabilities, score_shape
-from brrp_cli.evaluation.true_meshes import close_truth
-from brrp_cli.evaluation.true_shape import TrueShape, true_shape
 from brrp_cli.evaluation.variants import Variant
+from brrp_cli.evaluation.work import Plan, lost_row
 from brrp_cli.frames.frame import Frame
-from brrp_cli.methods.base import FAILED, ObjectReconstruction
+from brrp_cli.ground_truth.scenes import Scene
+from brrp_cli.ground_truth.true_meshes import close_truth
+from brrp_cli.ground_truth.true_shape import TrueShape, true_shape
 from brrp_cli.methods.registry import METHODS, Setup
 from brrp_cli.prior.objects import PriorObject
 from brrp_cli.prior.store import Prior, open_prior
+from brrp_cli.reconstruction import FAILED, ObjectReconstruction
 from brrp_cli.retrieval.base import unknown
-from brrp_cli.retrieval.remember import RememberingRetriever
+from brrp_cli.retrieval.cached import RememberingRetriever
 from brrp_cli.seeds import child_rng
 
 if TYPE_CHECKING:

@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from brrp_cli.depth_noise.structured_light import add_depth_noise
 from brrp_cli.frames.frame import BACKGROUND, Frame
-from brrp_cli.frames.noise import add_depth_noise
 from brrp_cli.geometry import backproject
 
 

@@ -10,10 +10,10 @@ from brrp_cli.config import SurfaceConfig, preset
 from brrp_cli.evaluation.variants import Variant
 from brrp_cli.files import atomic_path
 from brrp_cli.frames.frame import Frame
-from brrp_cli.methods.base import ObjectReconstruction
 from brrp_cli.methods.registry import METHODS
+from brrp_cli.reconstruction import ObjectReconstruction
+from brrp_cli.rendering.preview import preview
 from brrp_cli.surface.extract import extract_surface
-from brrp_cli.surface.preview import preview
 
 
 def write_picture(

@@ -9,13 +9,13 @@ from typing import Any
 
 from brrp_cli.errors import BrrpError
 from brrp_cli.evaluation.evaluate_scene import evaluate_scene
-from brrp_cli.evaluation.plan import Plan, lost_row
 from brrp_cli.evaluation.rows import Row, RowLog, finished, variant_columns, variant_of
-from brrp_cli.evaluation.scenes import Scene
-from brrp_cli.evaluation.true_meshes import close_truth
-from brrp_cli.evaluation.truth import TrueObject
 from brrp_cli.evaluation.variants import Variant, same_results
-from brrp_cli.prior.workers import run_tasks
+from brrp_cli.evaluation.work import Plan, lost_row
+from brrp_cli.executors import run_tasks
+from brrp_cli.ground_truth.scenes import Scene
+from brrp_cli.ground_truth.true_meshes import close_truth
+from brrp_cli.ground_truth.truth import TrueObject
 
 # A scene takes minutes; what takes so long will not end.
 TIME_LIMIT = 4 * 3600.0

@@ -13,10 +13,10 @@ from brrp_cli.evaluation.calibration import (
     negative_log_likelihood,
     reliability,
 )
-from brrp_cli.evaluation.metrics import chamfer, f_score, iou, sample_surface
-from brrp_cli.evaluation.true_shape import FINE, TrueShape
 from brrp_cli.geometry import similarity, transform_points
-from brrp_cli.methods.base import OccupancyPosterior, Retrieved
+from brrp_cli.ground_truth.metrics import chamfer, f_score, iou, sample_surface
+from brrp_cli.ground_truth.true_shape import FINE, TrueShape
+from brrp_cli.reconstruction import OccupancyPosterior, Retrieved
 
 if TYPE_CHECKING:
     import trimesh

@@ -20,7 +20,7 @@ from brrp_cli.evaluation.retrieval import (
 from brrp_cli.evaluation.rows import METRICS, STAGES, Row, variant_of
 from brrp_cli.evaluation.score_object import REGIONS
 from brrp_cli.evaluation.variants import Variant
-from brrp_cli.methods.base import FAILED, TOO_FEW_POINTS
+from brrp_cli.reconstruction import FAILED, TOO_FEW_POINTS
 from brrp_cli.seeds import child_rng
 
 RETRIEVAL = (

@@ -91,8 +91,8 @@ def factors(points: Tensor, grid: HingeGrid) -> Factors:
     return Factors(x, (y[:, :, None] * z[:, None, :]).flatten(start_dim=1))
 
 
-def lattice_logits(weights: Tensor, axes: tuple[Tensor, Tensor, Tensor], grid: HingeGrid) -> Tensor:
-    """w . phi on a whole lattice: (P, nx, ny, nz) for weights (P, H + 1) and its three axes.
+def grid_logits(weights: Tensor, axes: tuple[Tensor, Tensor, Tensor], grid: HingeGrid) -> Tensor:
+    """w . phi on a whole grid: (P, nx, ny, nz) for weights (P, H + 1) and its three axes.
 
     Contracts one axis after the other and never forms a feature. Only the floor is left out, which
     changes a logit by at most floor * |w|_1.

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from brrp_cli.inference.mean import MeanLattice
 from brrp_cli.inference.posterior import HilbertPosterior, mean_occupancy
-from brrp_cli.methods.base import METRES, Axes
+from brrp_cli.inference.prior_mean import PriorMeanGrid
+from brrp_cli.reconstruction import METRES, Axes
 
 # Standard deviation of the logistic distribution over 4: a surface whose occupancy is a logistic
 # function of the way across it has this over the gradient as standard deviation of its place.
@@ -28,13 +28,13 @@ class HypothesisPosterior:
     particles' weights
     """
 
-    mean: MeanLattice
+    mean: PriorMeanGrid
     which: NDArray[np.int64]
     correction: HilbertPosterior
 
     @property
     def bounds(self) -> NDArray[np.float64]:
-        """(2, 3) metres, camera frame: the lattice's box, outside of which nothing is occupied."""
+        """(2, 3) metres, camera frame: the grid's box, outside of which nothing is occupied."""
         return np.stack([self.mean.lower, self.mean.upper])
 
     def logits(self, points: NDArray[np.floating]) -> NDArray[np.float32]:
@@ -46,7 +46,7 @@ class HypothesisPosterior:
         return mean_occupancy(self.logits(points))
 
     def probability_volume(self, axes: Axes) -> NDArray[np.float32]:
-        """Occupancy probability (nx, ny, nz) on a lattice of camera-frame coordinates, metres."""
+        """Occupancy probability (nx, ny, nz) on a grid of camera-frame coordinates, metres."""
         logits = self.mean.volume(axes)[self.which] + self.correction.logit_volume(axes)
         return mean_occupancy(logits)
 

@@ -21,8 +21,8 @@ from brrp_cli.inference.density import logistic_score
 from brrp_cli.inference.hinge import HingeGrid, factors
 from brrp_cli.inference.hypothesis_posterior import HypothesisPosterior
 from brrp_cli.inference.infer import LabelledPoints
-from brrp_cli.inference.mean import MeanLattice
 from brrp_cli.inference.posterior import HilbertPosterior
+from brrp_cli.inference.prior_mean import PriorMeanGrid
 from brrp_cli.inference.svgd import run_svgd
 from brrp_cli.seeds import child_seed
 
@@ -38,7 +38,7 @@ class Problem:
     """
 
     observed: LabelledPoints
-    mean: MeanLattice
+    mean: PriorMeanGrid
     which: NDArray[np.int64]
     box: Array
 
@@ -76,7 +76,7 @@ def infer_correction(
     return HypothesisPosterior(problem.mean, which, correction)
 
 
-def share_out(weights: Array, particles: int) -> NDArray[np.int64]:
+def systematic_resampling(weights: Array, particles: int) -> NDArray[np.int64]:
     """Hypothesis (P,) of each particle: systematic resampling, in the order of the hypotheses.
 
     Each of the weights (C,), sum 1, gets its share rounded up or down.

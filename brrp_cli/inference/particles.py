@@ -8,11 +8,11 @@ from numpy.typing import NDArray
 
 from brrp_cli.inference.hypothesis_posterior import HypothesisPosterior
 from brrp_cli.inference.posterior import HilbertPosterior
-from brrp_cli.methods.base import Axes, OccupancyPosterior
+from brrp_cli.reconstruction import Axes, OccupancyPosterior
 
 
 def particle_volumes(posterior: OccupancyPosterior, axes: Axes) -> NDArray[np.float32]:
-    """Occupancy probability (P, nx, ny, nz) of each particle on a lattice of camera-frame
+    """Occupancy probability (P, nx, ny, nz) of each particle on a grid of camera-frame
     coordinates, metres; their mean over P is `posterior.probability_volume(axes)`.
 
     V-PRISM and PointSDF have no particles: P is 1, and that is the mean.

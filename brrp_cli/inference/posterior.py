@@ -8,8 +8,8 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from brrp_cli.inference.hinge import HingeGrid, factors, lattice_logits
-from brrp_cli.methods.base import LOGIT_VARIANCE, Axes
+from brrp_cli.inference.hinge import HingeGrid, factors, grid_logits
+from brrp_cli.reconstruction import LOGIT_VARIANCE, Axes
 
 # So many points at once: their products stay in the cache.
 CHUNK = 2_048
@@ -59,16 +59,16 @@ class HilbertPosterior:
         return self.uncertainty(vertices)
 
     def probability_volume(self, axes: Axes) -> NDArray[np.float32]:
-        """Occupancy probability (nx, ny, nz) on a lattice of camera-frame coordinates, metres."""
+        """Occupancy probability (nx, ny, nz) on a grid of camera-frame coordinates, metres."""
         return mean_occupancy(self.logit_volume(axes))
 
     def logit_volume(self, axes: Axes) -> NDArray[np.float32]:
-        """w . phi (P, nx, ny, nz) on a lattice of camera-frame coordinates, metres."""
+        """w . phi (P, nx, ny, nz) on a grid of camera-frame coordinates, metres."""
         local = tuple(
             torch.from_numpy((np.asarray(axis, np.float64) - middle).astype(np.float32))
             for axis, middle in zip(axes, self.center, strict=True)
         )
-        logits = lattice_logits(
+        logits = grid_logits(
             torch.from_numpy(self.weights), (local[0], local[1], local[2]), self.grid
         )
         return np.asarray(logits.numpy())

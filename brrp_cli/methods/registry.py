@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Any
 
 from brrp_cli.config import Config, PointSDFConfig, VPrismConfig
 from brrp_cli.frames.frame import Frame
-from brrp_cli.methods.base import ObjectReconstruction
+from brrp_cli.reconstruction import ObjectReconstruction
 
 if TYPE_CHECKING:
-    from brrp_cli.pointsdf.network import PointSDF
+    from brrp_cli.methods.pointsdf.network import PointSDF
     from brrp_cli.prior.store import Prior
     from brrp_cli.retrieval.base import Retriever
 
@@ -78,7 +78,7 @@ def _retrieval(frame: Frame, setup: Setup) -> list[ObjectReconstruction]:
 
 
 def _vprism(frame: Frame, setup: Setup) -> list[ObjectReconstruction]:
-    from brrp_cli.methods.vprism import reconstruct_vprism
+    from brrp_cli.methods.vprism.method import reconstruct_vprism
 
     return reconstruct_vprism(frame, VPrismConfig(), setup.seed)
 
@@ -89,7 +89,7 @@ def _vprism_configuration(config: Config) -> dict[str, Any]:
 
 def _pointsdf(frame: Frame, setup: Setup) -> list[ObjectReconstruction]:
     from brrp_cli.api import pick_device
-    from brrp_cli.methods.pointsdf import reconstruct_pointsdf
+    from brrp_cli.methods.pointsdf.method import reconstruct_pointsdf
 
     assert setup.weights is not None
     network = _network(setup.weights, pick_device(setup.device))
@@ -99,7 +99,7 @@ def _pointsdf(frame: Frame, setup: Setup) -> list[ObjectReconstruction]:
 @lru_cache(maxsize=4)
 def _network(weights: Path, device: str) -> PointSDF:
     """Read once for all frames of a process."""
-    from brrp_cli.pointsdf.weights import load_weights
+    from brrp_cli.methods.pointsdf.weights import load_weights
 
     return load_weights(weights).network.to(device)
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import time
 
 from brrp_cli.frames.frame import Frame
-from brrp_cli.methods.base import OK, ObjectReconstruction, Retrieved
 from brrp_cli.prior.store import Prior
+from brrp_cli.reconstruction import OK, ObjectReconstruction, Retrieved
 from brrp_cli.retrieval.base import Retriever, top_k, unknown
 
 

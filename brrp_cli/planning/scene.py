@@ -11,15 +11,15 @@ from numpy.typing import NDArray
 
 from brrp_cli.config import MeanConfig
 from brrp_cli.errors import ResultError
-from brrp_cli.frames.plane import Plane
 from brrp_cli.geometry import similarity, transform_points
-from brrp_cli.inference.mean import empty_space
+from brrp_cli.inference.prior_mean import empty_space
+from brrp_cli.observation.support_plane import Plane
 from brrp_cli.planning.body import Body, body_axes, body_pose, mass_and_inertia
 from brrp_cli.planning.mjcf import Table
 from brrp_cli.planning.options import PlanOptions
 from brrp_cli.planning.parts import convex_parts
+from brrp_cli.results.read import StoredResult
 from brrp_cli.surface.confidence import ConfidenceSurface, confidence_surface
-from brrp_cli.surface.stored import StoredResult
 
 if TYPE_CHECKING:
     import trimesh

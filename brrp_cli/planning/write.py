@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 
 from brrp_cli.errors import ResultError
 from brrp_cli.files import atomic_folder
-from brrp_cli.frames.picture import PALETTE
 from brrp_cli.planning.body import Body
 from brrp_cli.planning.curobo import curobo_world
 from brrp_cli.planning.mjcf import Files, Table, body_mjcf, scene_mjcf
@@ -20,7 +19,8 @@ from brrp_cli.planning.options import PlanOptions
 from brrp_cli.planning.scene import PlannedObject, planned_objects, table_under, upwards
 from brrp_cli.planning.urdf import urdf
 from brrp_cli.raycast import raycasting_scene
-from brrp_cli.surface.stored import StoredResult
+from brrp_cli.results.read import StoredResult
+from brrp_cli.segmentation.mask_picture import PALETTE
 from brrp_cli.version import __version__
 
 if TYPE_CHECKING:

@@ -1,4 +1,4 @@
-"""Signed distance to a closed surface, kept on a lattice."""
+"""Signed distance to a closed surface, kept on a grid."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class DistanceField:
     values: NDArray[np.float32]
 
     def signed_distance(self, points: NDArray[np.floating]) -> NDArray[np.float64]:
-        """Distance (n,) at points (n, 3): trilinear; off the lattice, that of its nearest point
+        """Distance (n,) at points (n, 3): trilinear; off the grid, that of its nearest point
         and the way there."""
         from scipy.ndimage import map_coordinates
 
@@ -44,7 +44,7 @@ class DistanceField:
         distance[beyond] += np.linalg.norm(off[:, beyond], axis=0) * self.spacing
         return np.asarray(distance)
 
-    def distance_and_slope(
+    def distance_and_gradient(
         self, points: NDArray[np.float32]
     ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
         """Distance (n,) at points (3, n), as `signed_distance` has it, and its gradient (3, n)."""
@@ -82,7 +82,7 @@ class DistanceField:
 
 def distance_field(mesh: trimesh.Trimesh, config: FieldConfig) -> DistanceField:
     """The field of a closed mesh on about `config.nodes` nodes, which reach `config.margin` beyond
-    its bounding box. The longer the box, the coarser: a flat object gets a fine lattice."""
+    its bounding box. The longer the box, the coarser: a flat object gets a fine grid."""
     o3d = import_open3d()
     low, high = mesh.bounds[0] - config.margin, mesh.bounds[1] + config.margin
     spacing = float((np.prod(high - low) / config.nodes) ** (1 / 3))

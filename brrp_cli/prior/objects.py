@@ -8,21 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from brrp_cli.appearance.descriptor import Appearance
+from brrp_cli.descriptors.descriptor import Appearance
+from brrp_cli.descriptors.fpfh import FeatureCloud
 from brrp_cli.prior.distance_field import DistanceField
-
-
-@dataclass(frozen=True)
-class FeatureCloud:
-    """A cloud with what registration needs of it.
-
-    points : (n, 3) float64, metres; normals : (n, 3) float64, unit, outward or towards the camera;
-    fpfh : (n, 33) float64.
-    """
-
-    points: NDArray[np.float64]
-    normals: NDArray[np.float64]
-    fpfh: NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -8,10 +8,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from brrp_cli.appearance.descriptor import Appearance
+from brrp_cli.descriptors.descriptor import Appearance
+from brrp_cli.descriptors.fpfh import FeatureCloud
 from brrp_cli.geometry import normalise
 from brrp_cli.prior.distance_field import DistanceField
-from brrp_cli.prior.objects import FeatureCloud, PriorObject, RestingPose
+from brrp_cli.prior.objects import PriorObject, RestingPose
 from brrp_cli.prior.shard import APPEARANCE, ARRAYS, DISTANCES, StoredObject
 
 

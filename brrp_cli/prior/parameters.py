@@ -48,7 +48,7 @@ class AppearanceConfig:
 
 @dataclass(frozen=True)
 class FieldConfig:
-    """The lattice of signed distances: its nodes, and how far it reaches beyond the bounding box,
+    """The grid of signed distances: its nodes, and how far it reaches beyond the bounding box,
     normalised."""
 
     nodes: int = 60_000

@@ -17,7 +17,7 @@
         appearance/colour   (v, COLOUR_BINS) u1  square roots of histograms, 255 = 1; 0: no colours
         appearance/pairs    (v, PAIR_BINS)   u1  likewise
         appearance/sizes    (r, 3)  f4  metres: height, footprint in each resting pose
-        distances/lower     (3,)    f8  normalised: the first node of a lattice of signed distances
+        distances/lower     (3,)    f8  normalised: the first node of a grid of signed distances
         distances/spacing   (1,)    f8
         distances/values    (a, b, c) f2  negative inside
 
@@ -42,9 +42,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from brrp_cli.appearance.colour import COLOUR_BINS
-from brrp_cli.appearance.descriptor import Appearance
-from brrp_cli.appearance.pairs import PAIR_BINS
+from brrp_cli.descriptors.colour_histogram import COLOUR_BINS
+from brrp_cli.descriptors.descriptor import Appearance
+from brrp_cli.descriptors.point_pairs import PAIR_BINS
 from brrp_cli.errors import PriorError
 from brrp_cli.files import parse_json, write_bytes
 from brrp_cli.hdf5 import hdf5_bytes
@@ -213,7 +213,7 @@ def read_stored(file: h5py.File, name: str) -> StoredObject:
     if DISTANCES in group and not (
         arrays[f"{DISTANCES}/spacing"][0] > 0 and min(arrays[f"{DISTANCES}/values"].shape) > 1
     ):
-        raise damaged(where, "distances without a lattice")
+        raise damaged(where, "distances without a grid")
     if starts[0] != 0 or starts[-1] != reading.lengths["p"] or (np.diff(starts) < 0).any():
         raise damaged(where, "clouds that overlap")
     return StoredObject(name, str(group.attrs["input_sha256"]), arrays, record)

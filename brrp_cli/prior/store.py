@@ -12,8 +12,9 @@ from typing import Any
 
 from brrp_cli.errors import BrrpError, PriorError
 from brrp_cli.files import sha256_file
+from brrp_cli.prior.appearance_file import is_whole
+from brrp_cli.prior.appearance_index import AppearanceIndex, open_appearance_index
 from brrp_cli.prior.index import Index, read_index
-from brrp_cli.prior.looks import Looks, open_looks
 from brrp_cli.prior.manifest import (
     FILE,
     Manifest,
@@ -25,7 +26,6 @@ from brrp_cli.prior.manifest import (
 from brrp_cli.prior.objects import PriorObject
 from brrp_cli.prior.pack import unpack
 from brrp_cli.prior.shard import damaged, object_names, open_shard, read_stored
-from brrp_cli.prior.sidecar import is_whole
 
 # Objects that are held in memory once they were read, about 2 MB each.
 HELD = 64
@@ -80,10 +80,10 @@ class Prior:
         return self.index.parameters
 
     @cached_property
-    def appearance(self) -> Looks | None:
+    def appearance(self) -> AppearanceIndex | None:
         """What the objects look like, a row for each name (see looks.py); None in a prior of an
         older brrp. Errors: PriorError."""
-        return open_looks(self.path, self.index, lambda: self.manifest)
+        return open_appearance_index(self.path, self.index, lambda: self.manifest)
 
     @property
     def digest(self) -> str:

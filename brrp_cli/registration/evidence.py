@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from brrp_cli.frames.frame import Frame
-from brrp_cli.frames.lookup import depth_behind
+from brrp_cli.frames.projection import depth_behind
 
 
 def explained(

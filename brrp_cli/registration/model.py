@@ -37,7 +37,7 @@ class Model:
         unit = self.stored.half_extent
         return self.stored.distances.signed_distance(points / unit) * unit
 
-    def distance_and_slope(
+    def distance_and_gradient(
         self, points: NDArray[np.float32]
     ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
         """`signed_distance` (n,) and its gradient (3, n), at points (3, n). Errors: PriorError,
@@ -45,7 +45,7 @@ class Model:
         if self.stored.distances is None:
             raise no_distances(self.stored.name)
         unit = np.float32(self.stored.half_extent)
-        distance, slope = self.stored.distances.distance_and_slope(points / unit)
+        distance, slope = self.stored.distances.distance_and_gradient(points / unit)
         return distance * unit, slope
 
     @property

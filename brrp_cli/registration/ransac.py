@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from brrp_cli.config import RegistrationConfig
 from brrp_cli.dependencies import import_open3d, seeded_open3d
-from brrp_cli.prior.objects import FeatureCloud
+from brrp_cli.descriptors.fpfh import FeatureCloud
 
 
 @dataclass(frozen=True)

@@ -14,18 +14,18 @@ from numpy.typing import NDArray
 from brrp_cli.config import Config
 from brrp_cli.errors import RetrievalError
 from brrp_cli.frames.frame import BACKGROUND, Frame
-from brrp_cli.frames.observe import box_center
-from brrp_cli.frames.plane import Plane, fit_plane
-from brrp_cli.prior.looks import Looks
+from brrp_cli.observation.ray_samples import box_center
+from brrp_cli.observation.support_plane import Plane, fit_plane
+from brrp_cli.prior.appearance_index import AppearanceIndex
 from brrp_cli.prior.store import Prior
-from brrp_cli.retrieval.belief import Evidence, believe
-from brrp_cli.retrieval.lights import lights, local_lights, log_prior
-from brrp_cli.retrieval.likeness import evidence, lit_histograms
-from brrp_cli.retrieval.seen import see_object
+from brrp_cli.retrieval.illuminants import lights, local_lights, log_prior
+from brrp_cli.retrieval.observed_appearance import see_object
+from brrp_cli.retrieval.score_fusion import Similarity, believe
 from brrp_cli.retrieval.shortlist import Shortlist
+from brrp_cli.retrieval.similarity import evidence, lit_histograms
 
 
-def need_appearance(prior: Prior) -> Looks:
+def need_appearance(prior: Prior) -> AppearanceIndex:
     """The prior's descriptors. Errors: RetrievalError if it has none."""
     looks = prior.appearance
     if looks is None:
@@ -74,7 +74,7 @@ class AppearanceRetriever:
             )
         return self._answers[object_id]
 
-    def evidence(self, frame: Frame) -> dict[int, Evidence]:
+    def evidence(self, frame: Frame) -> dict[int, Similarity]:
         """How alike every object of the frame is to the stored ones, by id."""
         plane = self.plane(frame)
         found = {}

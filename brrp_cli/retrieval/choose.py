@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from brrp_cli.config import Config
 from brrp_cli.errors import RetrievalError
-from brrp_cli.retrieval.clip_files import clip_folder, need_clip_folder
+from brrp_cli.retrieval.clip.model_files import clip_folder, need_clip_folder
 
 if TYPE_CHECKING:
     from brrp_cli.prior.store import Prior
@@ -40,7 +40,7 @@ def choose_retriever(
     """
     name = resolve_name(name, clip_dir, prior)
     if name == "both":
-        from brrp_cli.retrieval.both import BothRetriever
+        from brrp_cli.retrieval.combined import BothRetriever
 
         return BothRetriever(
             _one("clip", prior, config, seed, clip_dir),
@@ -63,7 +63,7 @@ def _one(name: str, prior: Prior, config: Config, seed: int, clip_dir: Path | No
 
         return UniformRetriever(prior.names)
     if name == "clip":
-        from brrp_cli.retrieval.clip import clip_retriever
+        from brrp_cli.retrieval.clip.retriever import clip_retriever
 
         return clip_retriever(prior, need_clip_folder(clip_dir))
     if Path(name).is_file():

@@ -17,14 +17,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brrp_cli.config import Config
+from brrp_cli.descriptors.fpfh import FeatureCloud
 from brrp_cli.frames.frame import Frame
 from brrp_cli.geometry import normalise, similarity, transform_points
-from brrp_cli.prior.objects import FeatureCloud, PriorObject
+from brrp_cli.prior.objects import PriorObject
 from brrp_cli.prior.store import Prior
 from brrp_cli.registration.evidence import contradicted, explained
 from brrp_cli.registration.ransac import match_repeatedly
 from brrp_cli.registration.refine import refine
-from brrp_cli.registration.scan import ObservedCloud, observed_cloud
+from brrp_cli.registration.scale_scan import ObservedCloud, observed_cloud
 from brrp_cli.retrieval.base import softmax
 from brrp_cli.seeds import child_seed
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from brrp_cli.prior.looks import FirstLook
-from brrp_cli.retrieval.belief import NEUTRAL_COLOUR, WEIGHTS
-from brrp_cli.retrieval.likeness import size_penalty
-from brrp_cli.retrieval.seen import SeenObject
+from brrp_cli.prior.appearance_index import AppearanceSummary
+from brrp_cli.retrieval.observed_appearance import SeenObject
+from brrp_cli.retrieval.score_fusion import NEUTRAL_COLOUR, WEIGHTS
+from brrp_cli.retrieval.similarity import size_penalty
 
 # Every object is looked at closely in a prior of this size or less.
 CLOSELY = 256
@@ -22,7 +22,7 @@ _CHUNK = 1_000
 class Shortlist:
     """A first look at all objects."""
 
-    def __init__(self, first: FirstLook) -> None:
+    def __init__(self, first: AppearanceSummary) -> None:
         self._first = first
         self._all = np.arange(len(first.colour))
         self._plain = ~first.colour.any(axis=1)

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from brrp_cli.methods.base import METRES, Surface
+from brrp_cli.reconstruction import METRES, Surface
 
 # Share of a scene's vertices whose spread lies under the top of the colour scale: a few vertices
 # far from every sample would otherwise flatten everything else into one colour.

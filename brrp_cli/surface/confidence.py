@@ -30,8 +30,8 @@ from numpy.typing import NDArray
 
 from brrp_cli.config import SurfaceConfig
 from brrp_cli.inference.particles import particle_volumes
-from brrp_cli.methods.base import Axes, OccupancyPosterior
-from brrp_cli.surface.extract import lattice_axes, level_set
+from brrp_cli.reconstruction import Axes, OccupancyPosterior
+from brrp_cli.surface.extract import grid_axes, level_set
 
 # Which of points (n, 3), metres, camera frame, were seen to be empty: (n,) bool.
 Empty = Callable[[NDArray[np.float64]], NDArray[np.bool_]]
@@ -58,7 +58,7 @@ def confidence_level(volumes: NDArray[np.floating], confidence: float) -> float 
     """The largest t at which P(O in C_t) >= confidence; None where even "O is empty" is that
     probable.
 
-    volumes : (P, ...) occupancy of each particle at the points of a lattice; confidence : in (0, 1)
+    volumes : (P, ...) occupancy of each particle at the points of a grid; confidence : in (0, 1)
     """
     particles = volumes.reshape(len(volumes), -1)
     mean = particles.mean(axis=0)
@@ -83,7 +83,7 @@ def confidence_surface(
     observed point is near are dropped. None where nothing is left.
     margin : metres by which C_t is grown where `empty` does not forbid it
     """
-    axes = lattice_axes(posterior.bounds, config.spacing)
+    axes = grid_axes(posterior.bounds, config.spacing)
     volumes = particle_volumes(posterior, axes)
     level = confidence_level(volumes, confidence)
     if level is None:
@@ -104,7 +104,7 @@ def confidence_surface(
 
 
 def _at_edge(region: NDArray[np.bool_]) -> bool:
-    """Whether a region (nx, ny, nz) reaches an outermost node of its lattice."""
+    """Whether a region (nx, ny, nz) reaches an outermost node of its grid."""
     inner = np.zeros_like(region)
     inner[1:-1, 1:-1, 1:-1] = True
     return bool((region & ~inner).any())
@@ -117,7 +117,7 @@ def _grown(
     spacing: float,
     empty: Empty | None,
 ) -> tuple[NDArray[np.float64], Axes]:
-    """A volume on a lattice that is wider by `margin`, at least 1 within `margin` of where the
+    """A volume on a grid that is wider by `margin`, at least 1 within `margin` of where the
     given one is; nodes that are `empty` keep their value."""
     from scipy.ndimage import distance_transform_edt
 

@@ -10,15 +10,15 @@ from numpy.typing import NDArray
 from brrp_cli.config import SurfaceConfig
 from brrp_cli.errors import BrrpError
 from brrp_cli.finite import check_finite
-from brrp_cli.methods.base import Axes, OccupancyPosterior, Surface
+from brrp_cli.reconstruction import Axes, OccupancyPosterior, Surface
 
 # How far, at least, the occupancy of what is inside lies above the level: 10 micrometres.
 _CLEAR = 1e-3
 MAX_NODES = 2**24
 
 
-def lattice_axes(bounds: NDArray[np.floating], spacing: float) -> Axes:
-    """Coordinates along x, y and z of a lattice that fills a box (2, 3), metres."""
+def grid_axes(bounds: NDArray[np.floating], spacing: float) -> Axes:
+    """Coordinates along x, y and z of a grid that fills a box (2, 3), metres."""
     x, y, z = (np.arange(low, high + spacing / 2, spacing) for low, high in bounds.T)
     return x, y, z
 
@@ -34,7 +34,7 @@ def extract_surface(
     if the posterior is not finite, or wider than any object.
     """
     _check_size(posterior.bounds, config.spacing)
-    axes = lattice_axes(posterior.bounds, config.spacing)
+    axes = grid_axes(posterior.bounds, config.spacing)
     volume = posterior.probability_volume(axes)
     check_finite("The posterior", occupancy=volume)
     found = level_set(volume, axes, observed, config.level, config)
@@ -79,7 +79,7 @@ def level_set(
 
 
 def _check_size(bounds: NDArray[np.floating], spacing: float) -> None:
-    """BrrpError where a lattice would hold more nodes than memory: one stray pixel of a mask on a
+    """BrrpError where a grid would hold more nodes than memory: one stray pixel of a mask on a
     far wall makes an object metres wide."""
     size = np.asarray(bounds[1] - bounds[0], dtype=np.float64)
     if not np.prod(size / spacing + 1) <= MAX_NODES:

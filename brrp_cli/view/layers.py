@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from brrp_cli.frames.frame import BACKGROUND, Frame
 from brrp_cli.geometry import project, transform_points
-from brrp_cli.methods.base import Surface
+from brrp_cli.reconstruction import Surface
+from brrp_cli.results.read import StoredResult
 from brrp_cli.surface.colours import spread
-from brrp_cli.surface.stored import StoredResult
 
 if TYPE_CHECKING:
     import trimesh

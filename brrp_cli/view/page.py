@@ -12,10 +12,10 @@ from importlib.resources import files
 import numpy as np
 from numpy.typing import NDArray
 
-from brrp_cli.frames.picture import draw_masks
-from brrp_cli.surface.stored import StoredResult
+from brrp_cli.results.read import StoredResult
+from brrp_cli.segmentation.mask_picture import draw_masks
 from brrp_cli.view.layers import page_glb
-from brrp_cli.view.told import told
+from brrp_cli.view.readout import told
 
 ASSETS = files("brrp_cli.view") / "assets"
 _QUALITY = 88

@@ -10,9 +10,9 @@ import numpy as np
 from brrp_cli.dependencies import import_library
 from brrp_cli.files import atomic_path
 from brrp_cli.frames.frame import BACKGROUND
-from brrp_cli.frames.picture import object_colours
+from brrp_cli.results.read import StoredResult
+from brrp_cli.segmentation.mask_picture import object_colours
 from brrp_cli.surface.colours import scale_top, spread, spread_colours
-from brrp_cli.surface.stored import StoredResult
 from brrp_cli.view.layers import collision_parts, observed_points
 
 

@@ -20,7 +20,7 @@ from brrp_cli.config import Config, FeatureConfig, preset
 from brrp_cli.errors import PriorError
 from brrp_cli.frames.npz import save_frame
 from brrp_cli.geometry import transform_points
-from brrp_cli.prior.build import build_prior
+from brrp_cli.prior.build.build import build_prior
 from brrp_cli.prior.parameters import BuildParameters
 from brrp_cli.raycast import inside, look
 from brrp_cli.retrieval.choose import choose_retriever

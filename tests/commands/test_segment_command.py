@@ -9,9 +9,9 @@ from PIL import Image
 from table_scene import T_CAM_WORLD, in_camera, photograph
 
 from brrp_cli.cli import main
-from brrp_cli.frames import edit_masks
 from brrp_cli.frames.build import make_frame
 from brrp_cli.frames.npz import load_frame, save_frame
+from brrp_cli.segmentation import edit_masks
 from brrp_cli.shapes import solids
 
 

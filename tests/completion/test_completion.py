@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 from table_scene import TABLE, box, in_camera, photograph, placed
 
-from brrp_cli.completion.around import COUNT, lengths
 from brrp_cli.completion.network import Network, fitted, from_bytes
-from brrp_cli.completion.part import seen_part
+from brrp_cli.completion.point_features import COUNT, point_features
+from brrp_cli.completion.visible_part import visible_part
 from brrp_cli.config import CompletionConfig, MeanConfig
-from brrp_cli.frames.lookup import at_pixels, depth_behind
-from brrp_cli.frames.plane import Plane
+from brrp_cli.frames.projection import at_pixels, depth_behind
 from brrp_cli.geometry import transform_points
-from brrp_cli.inference.mean import MeanLattice, completed_lattice, empty_space, lattice_over
+from brrp_cli.inference.prior_mean import PriorMeanGrid, completed_grid, empty_space, grid_over
+from brrp_cli.observation.support_plane import Plane
 from brrp_cli.shapes import solids
 
 CONFIG, MEAN = CompletionConfig(), MeanConfig()
@@ -27,18 +27,18 @@ def photographed(mesh, T_cam_mesh):
 
 def part_of(frame, plane=TABLE, points=None):
     points = frame.object_points(5) if points is None else points
-    return seen_part(points, frame, 5, plane, CONFIG)
+    return visible_part(points, frame, 5, plane, CONFIG)
 
 
 def completed(frame, config=MEAN, margin=0.05):
-    """The lattice's nodes, their logits, and which are seen to be empty."""
+    """The grid's nodes, their logits, and which are seen to be empty."""
     part = part_of(frame)
     extent = part.extent
     box = np.stack([extent.min(axis=0) - margin, extent.max(axis=0) + margin])
-    lower, spacing, nodes = lattice_over(box, config)
+    lower, spacing, nodes = grid_over(box, config)
     empty = empty_space(nodes.reshape(-1, 3), frame, 5, TABLE, config).reshape(nodes.shape[:3])
-    logits = completed_lattice(nodes, empty, part, config)
-    return nodes, MeanLattice(lower, spacing, logits[None], -config.limit), empty
+    logits = completed_grid(nodes, empty, part, config)
+    return nodes, PriorMeanGrid(lower, spacing, logits[None], -config.limit), empty
 
 
 def inside(frame, points):
@@ -92,31 +92,31 @@ def test_a_cup_that_is_looked_into_stays_hollow():
 def test_what_is_seen_has_some_thickness_whatever_the_network_says():
     frame = photographed(solids.beaker(0.04, 0.04, 0.06, 0.004), placed(0.0, 0.0, 0.0))
     nodes, crusted, empty = completed(frame)
-    _, bare, _ = completed(frame, replace(MEAN, crust=0.0))
+    _, bare, _ = completed(frame, replace(MEAN, shell=0.0))
     with_crust, without = (
-        lattice.values[0].astype(float).ravel()[~empty.ravel()] for lattice in (crusted, bare)
+        grid.values[0].astype(float).ravel()[~empty.ravel()] for grid in (crusted, bare)
     )
     points = nodes.reshape(-1, 3)[~empty.ravel()]
     behind = -depth_behind(points, frame)
-    seen = (at_pixels(points, frame.segmap, frame) == 5) & (behind > -0.001) & (behind < MEAN.crust)
+    seen = (at_pixels(points, frame.segmap, frame) == 5) & (behind > -0.001) & (behind < MEAN.shell)
     assert (without[seen] < 0).any()
-    assert (with_crust[seen] >= MEAN.crust_logit).all()
+    assert (with_crust[seen] >= MEAN.shell_logit).all()
     np.testing.assert_array_equal(with_crust[~seen], without[~seen])
 
 
 @pytest.mark.parametrize("nodes", [20_000, 60_000])
 def test_the_lattice_is_the_networks_where_it_counts(nodes):
     frame = photographed(box(), placed(0.0, 0.0, 0.3))
-    config = replace(MEAN, nodes=nodes, crust=0.0)
+    config = replace(MEAN, nodes=nodes, shell=0.0)
     part = part_of(frame)
     extent = part.extent
     around = np.stack([extent.min(axis=0) - 0.01, extent.max(axis=0) + 0.01])
-    _, _, at = lattice_over(around, config)
+    _, _, at = grid_over(around, config)
     # Along x the last node is asked first, along y it lies beyond the last that is.
     at = at[: (at.shape[0] - 1) // 2 * 2 + 1, : at.shape[1] // 2 * 2]
-    exact = fitted().logits(lengths(at.reshape(-1, 3), part)).reshape(at.shape[:3])
+    exact = fitted().logits(point_features(at.reshape(-1, 3), part)).reshape(at.shape[:3])
     nothing, everything = np.zeros(at.shape[:3], bool), np.ones(at.shape[:3], bool)
-    found = completed_lattice(at, nothing, part, config).astype(float)
+    found = completed_grid(at, nothing, part, config).astype(float)
     # Half precision; a node on the edge of a pixel may fall on either side.
     near = np.abs(found - exact.clip(-config.limit, config.limit)) < 0.01
     assert near[::2, ::2, ::2].mean() > 0.99
@@ -124,7 +124,7 @@ def test_the_lattice_is_the_networks_where_it_counts(nodes):
     assert doubtful.sum() > 200
     assert near[doubtful].mean() > 0.99 and ((found > 0) == (exact > 0)).mean() > 0.998
     assert not near.all(), "not all nodes are asked"
-    assert (completed_lattice(at, everything, part, config) == -config.limit).all()
+    assert (completed_grid(at, everything, part, config) == -config.limit).all()
 
 
 def test_a_part_has_the_extents_of_what_is_seen():
@@ -160,7 +160,7 @@ def test_flat_clouds_have_finite_lengths_and_are_empty_far_away(points, plane):
     frame = photographed(box(), placed(0.0, 0.0, 0.3))
     part = part_of(frame, plane, points)
     probes = np.concatenate([points, [[0.0, 0.0, 1.2], [0.3, 0.0, 0.8]]])
-    found = lengths(probes, part)
+    found = point_features(probes, part)
     assert found.shape == (len(probes), COUNT)
     assert np.isfinite(found).all()
     assert (fitted().logits(found)[-2:] < 0).all()
@@ -170,7 +170,9 @@ def test_lengths_do_not_depend_on_other_points():
     frame = photographed(box(), placed(0.02, -0.03, 0.8))
     part = part_of(frame)
     points = frame.object_points(5)[:50].astype(np.float64) + [0, 0, 0.02]
-    np.testing.assert_array_equal(lengths(points, part)[7:8], lengths(points[7:8], part))
+    np.testing.assert_array_equal(
+        point_features(points, part)[7:8], point_features(points[7:8], part)
+    )
 
 
 def network():

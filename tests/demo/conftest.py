@@ -2,7 +2,7 @@
 
 import pytest
 
-from brrp_cli.demo import starter
+from brrp_cli.prior.build import starter
 from brrp_cli.shapes.household import household_shapes
 
 NAMES = ("soup_can", "wood_block")

@@ -5,8 +5,8 @@ import pytest
 
 from brrp_cli.demo.layout import GAP, camera_pose, stand_apart
 from brrp_cli.demo.scene import INTRINSICS, LIGHT_WORLD, SHAPE, make_scene, shade
-from brrp_cli.evaluation.metrics import nearest_distances, sample_surface
 from brrp_cli.geometry import project, transform_points
+from brrp_cli.ground_truth.metrics import nearest_distances, sample_surface
 from brrp_cli.raycast import look
 from brrp_cli.shapes import solids
 from brrp_cli.shapes.household import household_shapes, household_variations

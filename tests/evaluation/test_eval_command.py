@@ -19,7 +19,7 @@ from tiny_scenes import write_meshes, write_scene
 import brrp_cli
 from brrp_cli.cli import main
 from brrp_cli.evaluation.rows import COLUMNS, COST, RowLog, finished
-from brrp_cli.prior.build import build_prior
+from brrp_cli.prior.build.build import build_prior
 from brrp_cli.prior.parameters import BuildParameters
 
 GHOST = 7

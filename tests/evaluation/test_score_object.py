@@ -11,11 +11,11 @@ from brrp_cli.evaluation.score_object import (
     score_probabilities,
     score_shape,
 )
-from brrp_cli.evaluation.true_meshes import ClosedMeshes
-from brrp_cli.evaluation.true_shape import behind_seen, true_shape
 from brrp_cli.frames.frame import Frame
 from brrp_cli.geometry import similarity
-from brrp_cli.methods.base import Retrieved
+from brrp_cli.ground_truth.true_meshes import ClosedMeshes
+from brrp_cli.ground_truth.true_shape import behind_seen, true_shape
+from brrp_cli.reconstruction import Retrieved
 
 RADIUS = 0.06
 CENTER = np.array([0.03, -0.02, 0.8])

@@ -20,13 +20,13 @@ from hypothesis.extra import numpy as hnp
 from brrp_cli.config import ObservationConfig
 from brrp_cli.errors import BrrpError, FrameError, PriorError, RetrievalError, SceneError
 from brrp_cli.evaluation.rows import METRICS, RowLog, table, variant_columns
-from brrp_cli.evaluation.truth import read_objects
 from brrp_cli.evaluation.variants import Variant
 from brrp_cli.frames.build import make_frame
 from brrp_cli.frames.intrinsics import read_intrinsics
 from brrp_cli.frames.npz import load_frame
-from brrp_cli.frames.observe import observe
-from brrp_cli.prior.descriptions import read_descriptions
+from brrp_cli.ground_truth.truth import read_objects
+from brrp_cli.observation.ray_samples import observe
+from brrp_cli.prior.build.descriptions import read_descriptions
 from brrp_cli.prior.manifest import parse_manifest
 from brrp_cli.retrieval.table import TableRetriever
 

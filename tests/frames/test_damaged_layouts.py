@@ -13,10 +13,10 @@ from PIL import Image
 from test_formats import image, info, write_bop, write_images, write_tum
 
 from brrp_cli.errors import BrrpError, FrameError, SceneError
-from brrp_cli.evaluation.scenes import find_scenes
 from brrp_cli.frames.format import Request
 from brrp_cli.frames.readers import read_frame
 from brrp_cli.frames.ros_images import frame_of
+from brrp_cli.ground_truth.scenes import find_scenes
 
 LONG = "x" * 400
 HARMFUL = {

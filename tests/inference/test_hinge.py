@@ -1,7 +1,7 @@
 import numpy as np
 import torch
 
-from brrp_cli.inference.hinge import HingeGrid, axis_factors, cubic_grid, features, lattice_logits
+from brrp_cli.inference.hinge import HingeGrid, axis_factors, cubic_grid, features, grid_logits
 
 GRID = cubic_grid(per_axis=5, half_width=0.1, floor=1e-7)
 
@@ -46,7 +46,7 @@ def test_lattice_logits_equal_the_features_point_by_point_with_axes_in_order():
     expected = (weights @ features(points, GRID).T).reshape(3, 4, 6, 7)
     bound = GRID.floor * weights.abs().sum(dim=1).max()
     torch.testing.assert_close(
-        lattice_logits(weights, (x, y, z), GRID), expected, rtol=0, atol=float(bound)
+        grid_logits(weights, (x, y, z), GRID), expected, rtol=0, atol=float(bound)
     )
 
 

@@ -1,4 +1,4 @@
-"""A posterior over hypotheses: its uncertainty in metres, its lattice, its file."""
+"""A posterior over hypotheses: its uncertainty in metres, its grid, its file."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ import pytest
 from brrp_cli.errors import BrrpError
 from brrp_cli.inference.hinge import HingeGrid
 from brrp_cli.inference.hypothesis_posterior import LARGEST, HypothesisPosterior
-from brrp_cli.inference.mean import MeanLattice
 from brrp_cli.inference.posterior import HilbertPosterior
-from brrp_cli.inference.posterior_file import open_posterior, save_posteriors
+from brrp_cli.inference.prior_mean import PriorMeanGrid
+from brrp_cli.results.posterior_file import open_posterior, save_posteriors
 
 CENTER = np.array([0.1, -0.2, 0.9])
 GRID = HingeGrid((-0.05, -0.05, -0.05), (3, 3, 3), 0.05, 1e-7)
@@ -25,7 +25,7 @@ def posterior(*functions, which=(0,), weights=0.0):
     x = np.arange(-0.06, 0.0601, SPACING)
     values = np.stack([np.broadcast_to(f(x)[:, None, None], (len(x), 9, 9)) for f in functions])
     lower = CENTER + [-0.06, -4 * SPACING, -4 * SPACING]
-    mean = MeanLattice(lower, SPACING, values.astype(np.float16), outside=-5.0)
+    mean = PriorMeanGrid(lower, SPACING, values.astype(np.float16), outside=-5.0)
     particles = np.random.default_rng(0).normal(0, 1, (len(which), GRID.dimension)) * weights
     correction = HilbertPosterior(particles.astype(np.float32), CENTER, GRID, 0.06)
     return HypothesisPosterior(mean, np.array(which), correction)

@@ -9,8 +9,13 @@ import pytest
 
 from brrp_cli.config import FittedMapConfig, MeanConfig
 from brrp_cli.inference.infer import LabelledPoints
-from brrp_cli.inference.infer_hypotheses import Problem, box_grid, infer_correction, share_out
-from brrp_cli.inference.mean import MeanLattice, lattice_over, shape_logits
+from brrp_cli.inference.infer_hypotheses import (
+    Problem,
+    box_grid,
+    infer_correction,
+    systematic_resampling,
+)
+from brrp_cli.inference.prior_mean import PriorMeanGrid, grid_over, shape_logits
 
 MEAN = replace(MeanConfig(), nodes=20_000)
 # Fewer hinge points than the preset has: the same code in a fraction of a second.
@@ -30,18 +35,18 @@ def empty(points):
 
 
 def mean_of(*distances):
-    """The lattice of hypotheses that are quite sure of themselves."""
-    lower, spacing, nodes = lattice_over(BOX, MEAN)
+    """The grid of hypotheses that are quite sure of themselves."""
+    lower, spacing, nodes = grid_over(BOX, MEAN)
     flat = nodes.reshape(-1, 3)
     values = np.stack([shape_logits(distance(flat), 1.0, MEAN) for distance in distances])
-    return MeanLattice(
+    return PriorMeanGrid(
         lower, spacing, values.reshape(-1, *nodes.shape[:3]).astype(np.float16), -MEAN.limit
     )
 
 
 def infer(observed, *distances, weights=None, seed=0, config=CONFIG):
     weights = np.full(len(distances), 1 / len(distances)) if weights is None else weights
-    which = share_out(weights, config.particles)
+    which = systematic_resampling(weights, config.particles)
     return infer_correction(Problem(observed, mean_of(*distances), which, BOX), config, seed=seed)
 
 
@@ -61,7 +66,7 @@ def around(count, seed=3):
     ],
 )
 def test_particles_are_shared_out_as_the_weights_say(weights, counts):
-    found = share_out(np.array(weights), 8)
+    found = systematic_resampling(np.array(weights), 8)
     np.testing.assert_array_equal(np.bincount(found, minlength=len(weights)), counts)
 
 
@@ -70,7 +75,7 @@ def test_every_hypothesis_gets_its_share_rounded_up_or_down():
     for _ in range(300):
         weights = rng.dirichlet(np.full(rng.integers(1, 9), 0.5))
         particles = int(rng.integers(1, 20))
-        found = share_out(weights, particles)
+        found = systematic_resampling(weights, particles)
         counts = np.bincount(found, minlength=len(weights))
         assert len(found) == particles and (np.diff(found) >= 0).all()
         assert (counts >= np.floor(weights * particles - 1e-9)).all()
@@ -78,7 +83,7 @@ def test_every_hypothesis_gets_its_share_rounded_up_or_down():
 
 
 def test_weights_that_miss_one_by_rounding_give_no_hypothesis_that_is_not_there():
-    assert share_out(np.array([0.3, 0.6]), 8).max() == 1
+    assert systematic_resampling(np.array([0.3, 0.6]), 8).max() == 1
 
 
 @pytest.mark.parametrize("extents", [(0.2, 0.2, 0.2), (0.4, 0.1, 0.15), (0.3, 0.3, 0.06)])

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from brrp_cli.config import WeighConfig
-from brrp_cli.methods.hypothesise import weigh
+from brrp_cli.methods.brrp_default import weigh
 
 CONFIG = WeighConfig()
 
@@ -15,15 +15,15 @@ def test_weights_are_a_distribution_over_hypotheses_and_the_unknown():
     rng = np.random.default_rng(0)
     for _ in range(200):
         count = int(rng.integers(0, 12))
-        shares, evidence = rng.random(count), rng.uniform(-2, 1, count)
-        weights = weigh(shares, evidence, rng.random(), CONFIG)
+        shares, alignment_score = rng.random(count), rng.uniform(-2, 1, count)
+        weights = weigh(shares, alignment_score, rng.random(), CONFIG)
         assert weights.shape == (count + 1,)
         assert (weights >= 0).all() and weights.sum() == pytest.approx(1)
 
 
 def test_the_formula_on_numbers():
-    """P(c|R) exp(25 evidence): 0.6 and 0.2 of 0.8, unknown 0.2 with evidence 0.65."""
-    config = WeighConfig(sharpness=25.0, unknown_evidence=0.65)
+    """P(c|R) exp(25 alignment score): 0.6 and 0.2 of 0.8, unknown 0.2 with alignment score 0.65."""
+    config = WeighConfig(sharpness=25.0, unknown_score=0.65)
     weights = weigh([0.6, 0.2], [0.6, 0.64], 0.2, config)
     raw = np.array([0.6 * np.exp(25 * 0.6), 0.2 * np.exp(25 * 0.64), 0.2 * np.exp(25 * 0.65)])
     np.testing.assert_allclose(weights, raw / raw.sum())
@@ -63,9 +63,7 @@ def test_a_retriever_that_is_certain_may_still_be_wrong():
 
 
 def test_the_more_is_missing_the_more_weight_has_the_unknown():
-    found = [
-        weigh([1 - m], [CONFIG.unknown_evidence], m, CONFIG)[-1] for m in np.linspace(0, 1, 11)
-    ]
+    found = [weigh([1 - m], [CONFIG.unknown_score], m, CONFIG)[-1] for m in np.linspace(0, 1, 11)]
     assert (np.diff(found) >= -1e-12).all()
     assert found[0] == pytest.approx(CONFIG.least_unknown)
     assert found[-1] == pytest.approx(CONFIG.most_unknown)

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from small_prior import SMALL, write_meshes
 
-from brrp_cli.prior.build import build_prior
+from brrp_cli.prior.build.build import build_prior
 from brrp_cli.prior.parameters import BuildParameters
 
 

@@ -31,7 +31,7 @@ def box_distance(points, half):
 
 
 def around(half, count=4000, seed=0):
-    """Points in a box and up to 0.1 beyond it, where the lattice is."""
+    """Points in a box and up to 0.1 beyond it, where the grid is."""
     return np.random.default_rng(seed).uniform(-1, 1, (count, 3)) * (np.array(half) + 0.1)
 
 
@@ -61,7 +61,7 @@ def test_the_field_of_a_box_is_known_within_half_a_cell(half):
 
 
 def test_a_box_that_stands_askew_and_away_from_the_origin():
-    """Axes, corner and sign of the lattice: no symmetry hides a mistake."""
+    """Axes, corner and sign of the grid: no symmetry hides a mistake."""
     half = np.array([0.5, 0.3, 0.2])
     T = trimesh.transformations.rotation_matrix(0.7, [1, 2, 3])
     T[:3, 3] = [0.4, -2.0, 1.0]
@@ -76,7 +76,7 @@ def test_a_box_that_stands_askew_and_away_from_the_origin():
 
 
 def test_off_the_lattice_the_distance_is_never_too_small_and_grows(ball, plate):
-    """The way to the lattice and on from there is no shorter than the way, and at most twice."""
+    """The way to the grid and on from there is no shorter than the way, and at most twice."""
     direction = np.random.default_rng(1).normal(size=(500, 3))
     direction /= np.linalg.norm(direction, axis=1, keepdims=True)
     for field, distance in (
@@ -202,7 +202,7 @@ def test_a_field_that_is_no_lattice_is_refused_though_its_checksum_is_right(
     field = DistanceField(np.zeros(3), spacing, np.zeros(shape, np.float32))
     write_shard(tmp_path / "bad.h5", [pack(replace(example(), distances=field), "aa")], {})
     with (
-        pytest.raises(PriorError, match="without a lattice"),
+        pytest.raises(PriorError, match="without a grid"),
         open_shard(tmp_path / "bad.h5") as file,
     ):
         read_stored(file, "cup")

@@ -8,7 +8,7 @@ from small_prior import SMALL
 
 from brrp_cli.errors import PriorError
 from brrp_cli.files import sha256_file
-from brrp_cli.prior.build import build_prior
+from brrp_cli.prior.build.build import build_prior
 from brrp_cli.prior.index import INDEX_FILE
 from brrp_cli.prior.manifest import FILE, Failure, read_manifest, write_manifest
 from brrp_cli.prior.store import open_prior

@@ -4,12 +4,13 @@ import h5py
 import numpy as np
 import pytest
 
-from brrp_cli.appearance.colour import COLOUR_BINS
-from brrp_cli.appearance.descriptor import Appearance
-from brrp_cli.appearance.pairs import PAIR_BINS
+from brrp_cli.descriptors.colour_histogram import COLOUR_BINS
+from brrp_cli.descriptors.descriptor import Appearance
+from brrp_cli.descriptors.fpfh import FeatureCloud
+from brrp_cli.descriptors.point_pairs import PAIR_BINS
 from brrp_cli.errors import PriorError
 from brrp_cli.prior.distance_field import DistanceField
-from brrp_cli.prior.objects import FeatureCloud, PriorObject, RestingPose
+from brrp_cli.prior.objects import PriorObject, RestingPose
 from brrp_cli.prior.pack import pack, unpack
 from brrp_cli.prior.shard import ARRAYS, object_names, open_shard, read_stored, write_shard
 

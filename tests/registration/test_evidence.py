@@ -1,8 +1,8 @@
 import numpy as np
+from brrp_cli.registration.alignment_score import contradicted, explained
 
 from brrp_cli.frames.frame import Frame
 from brrp_cli.geometry import backproject
-from brrp_cli.registration.evidence import contradicted, explained
 
 K = np.array([[100.0, 0, 50], [0, 100, 40], [0, 0, 1]])
 

@@ -16,9 +16,9 @@ from brrp_cli.api import Reconstruction
 from brrp_cli.errors import OutputError
 from brrp_cli.frames.build import make_frame
 from brrp_cli.frames.frame import Frame
-from brrp_cli.prior.build import build_prior
+from brrp_cli.prior.build.build import build_prior
 from brrp_cli.prior.parameters import BuildParameters
-from brrp_cli.surface.results import write_results
+from brrp_cli.results.write import write_results
 
 BOX = 1
 
@@ -146,7 +146,7 @@ def test_an_answer_that_is_no_probability_is_the_failure_of_its_object(
 def test_a_world_whose_origin_is_out_of_reach_of_single_precision_is_refused(
     seen: Frame, tmp_path: Path
 ) -> None:
-    from brrp_cli.surface.results import check_output
+    from brrp_cli.results.write import check_output
 
     T = np.eye(4)
     T[:3, 3] = [500_000.0, 4_000_000.0, 100.0]

@@ -7,7 +7,7 @@ import pytest
 
 from brrp_cli import api
 from brrp_cli.config import Config
-from brrp_cli.methods.base import FAILED, OK, TOO_FEW_POINTS, ObjectReconstruction, Retrieved
+from brrp_cli.reconstruction import FAILED, OK, TOO_FEW_POINTS, ObjectReconstruction, Retrieved
 
 
 def inferred() -> ObjectReconstruction:
@@ -39,7 +39,7 @@ def inferred() -> ObjectReconstruction:
         ("T_cam_object", "Registration of cup"),
         ("scale", "Registration of cup"),
         ("fitness", "Registration of cup"),
-        ("evidence", "Registration of cup"),
+        ("alignment_score", "Registration of cup"),
         ("weight", "Registration of cup"),
     ],
 )

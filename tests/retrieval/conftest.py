@@ -28,7 +28,7 @@ def published(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def manifest(published: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """The package's manifest names the models of `published` instead of those of the hub."""
     path = write_manifest(tmp_path / "clip.toml", published)
-    monkeypatch.setattr("brrp_cli.retrieval.clip_manifest.MANIFEST", path)
+    monkeypatch.setattr("brrp_cli.retrieval.clip.manifest.MANIFEST", path)
     return path
 
 

@@ -6,7 +6,7 @@ from painted_scene import STRANGE, THINGS, photograph, write_things
 
 from brrp_cli.config import FeatureConfig, preset
 from brrp_cli.errors import RetrievalError
-from brrp_cli.prior.build import build_prior
+from brrp_cli.prior.build.build import build_prior
 from brrp_cli.prior.parameters import BuildParameters
 from brrp_cli.prior.store import open_prior
 from brrp_cli.retrieval.appearance import AppearanceRetriever

@@ -14,13 +14,13 @@ import trimesh
 from brrp_cli.config import preset
 from brrp_cli.errors import RetrievalError
 from brrp_cli.frames.frame import Frame
-from brrp_cli.prior.build import build_prior
+from brrp_cli.prior.build.build import build_prior
 from brrp_cli.prior.parameters import BuildParameters
 from brrp_cli.prior.store import Prior, open_prior
-from brrp_cli.retrieval import clip_files
 from brrp_cli.retrieval.base import unknown
-from brrp_cli.retrieval.both import BothRetriever
 from brrp_cli.retrieval.choose import choose_retriever, resolve_name
+from brrp_cli.retrieval.clip import model_files as clip_files
+from brrp_cli.retrieval.combined import BothRetriever
 from brrp_cli.retrieval.table import TableRetriever
 
 CONFIG = preset("default")

@@ -4,8 +4,8 @@ import pytest
 from brrp_cli.errors import RetrievalError
 from brrp_cli.frames.frame import Frame
 from brrp_cli.retrieval.base import top_k
+from brrp_cli.retrieval.cached import RememberingRetriever
 from brrp_cli.retrieval.given import TruthRetriever, UniformRetriever
-from brrp_cli.retrieval.remember import RememberingRetriever
 
 NAMES = ["apple", "bowl", "cup", "mug"]
 

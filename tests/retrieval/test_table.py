@@ -6,7 +6,7 @@ import pytest
 from brrp_cli.errors import RetrievalError
 from brrp_cli.frames.frame import Frame
 from brrp_cli.retrieval.base import unknown
-from brrp_cli.retrieval.both import BothRetriever
+from brrp_cli.retrieval.combined import BothRetriever
 from brrp_cli.retrieval.table import TableRetriever
 
 NAMES = ["apple", "bowl", "cup"]

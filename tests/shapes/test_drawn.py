@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from brrp_cli.prior.bodies import is_solid
+from brrp_cli.prior.build.solids import is_solid
 from brrp_cli.shapes.drawn import KINDS, draw_household_shape
 
 

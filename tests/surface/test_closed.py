@@ -13,7 +13,7 @@ from hypothesis.extra import numpy as hnp
 
 from brrp_cli.config import SurfaceConfig
 from brrp_cli.errors import BrrpError
-from brrp_cli.methods.base import METRES
+from brrp_cli.reconstruction import METRES
 from brrp_cli.surface.extract import extract_surface
 
 SPACING = SurfaceConfig().spacing
@@ -22,8 +22,8 @@ SIDE = SPACING * (CELLS - 1)
 
 
 @dataclass
-class Lattice:
-    """A posterior that is given on the lattice that will be asked for."""
+class Grid:
+    """A posterior that is given on the grid that will be asked for."""
 
     values: np.ndarray
     doubt: float = 0.01
@@ -55,7 +55,7 @@ OBSERVED = np.array([[0.1, -0.2, 0.7]]) + SIDE / 2
     )
 )
 def test_any_occupancy_gives_a_closed_outward_mesh_or_none(values: np.ndarray) -> None:
-    surface = extract_surface(Lattice(values), OBSERVED, SurfaceConfig())
+    surface = extract_surface(Grid(values), OBSERVED, SurfaceConfig())
     if surface is None:
         return
     # As it is written and read: single precision.
@@ -63,7 +63,7 @@ def test_any_occupancy_gives_a_closed_outward_mesh_or_none(values: np.ndarray) -
     assert np.isfinite(mesh.vertices).all() and np.isfinite(surface.uncertainty).all()
     assert mesh.is_watertight and mesh.is_winding_consistent
     assert mesh.volume > 0
-    low, high = Lattice(values).bounds
+    low, high = Grid(values).bounds
     assert (mesh.vertices >= low - SPACING - 1e-6).all()
     assert (mesh.vertices <= high + SPACING + 1e-6).all()
 
@@ -72,16 +72,16 @@ def test_any_occupancy_gives_a_closed_outward_mesh_or_none(values: np.ndarray) -
 def test_an_occupancy_that_is_no_number_never_becomes_a_mesh(bad: float) -> None:
     values = np.zeros((CELLS,) * 3, np.float32)
     values[2:5, 2:5, 2:5] = 1
-    assert extract_surface(Lattice(values), OBSERVED, SurfaceConfig()) is not None
+    assert extract_surface(Grid(values), OBSERVED, SurfaceConfig()) is not None
     with pytest.raises(BrrpError, match="surface gave numbers that are NaN"):
-        extract_surface(Lattice(values, doubt=bad), OBSERVED, SurfaceConfig())
+        extract_surface(Grid(values, doubt=bad), OBSERVED, SurfaceConfig())
     values[0, 0, 0] = bad
     with pytest.raises(BrrpError, match="posterior gave numbers that are NaN"):
-        extract_surface(Lattice(values), OBSERVED, SurfaceConfig())
+        extract_surface(Grid(values), OBSERVED, SurfaceConfig())
 
 
 def test_an_object_wider_than_memory_is_refused_before_it_is_asked() -> None:
-    class Wide(Lattice):
+    class Wide(Grid):
         bounds = np.array([[-40.0, -28, 0], [0, 0, 90]])
 
         def probability_volume(self, axes) -> np.ndarray:

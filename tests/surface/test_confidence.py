@@ -11,7 +11,7 @@ from made_result import posterior_on
 from brrp_cli.config import SurfaceConfig
 from brrp_cli.inference.particles import particle_volumes
 from brrp_cli.surface.confidence import confidence_level, confidence_surface
-from brrp_cli.surface.extract import extract_surface, lattice_axes
+from brrp_cli.surface.extract import extract_surface, grid_axes
 
 CENTER = np.array([0.1, -0.05, 0.8])
 RADIUS, WIDTH = 0.03, 0.003
@@ -64,11 +64,11 @@ def test_what_each_point_allows_is_too_little_for_the_whole():
 
 @pytest.mark.parametrize("confidence", [0.8, 0.95])
 def test_drawn_shapes_lie_inside_as_often_as_it_says(confidence):
-    """O = {p_i > u}, drawn 20,000 times on the lattice."""
+    """O = {p_i > u}, drawn 20,000 times on the grid."""
     rng = np.random.default_rng(0)
     functions = [ball(CENTER + rng.normal(0, 0.006, 3), 0.025, w) for w in (0.001, 0.002, 0.004)]
     posterior = posterior_on(functions, box(0.07), which=(0, 1, 1, 2))
-    volumes = particle_volumes(posterior, lattice_axes(posterior.bounds, 0.003)).reshape(4, -1)
+    volumes = particle_volumes(posterior, grid_axes(posterior.bounds, 0.003)).reshape(4, -1)
     level = confidence_level(volumes, confidence)
     outside = volumes.mean(axis=0) < level
     which, u = rng.integers(4, size=20_000), rng.random(20_000)
@@ -132,7 +132,7 @@ def test_nothing_is_left_of_an_object_that_is_probably_nowhere():
 
 def test_particles_average_to_the_posterior():
     posterior = posterior_on([ball(), ball(radius=0.02)], box(0.05), which=(0, 1, 1))
-    axes = lattice_axes(posterior.bounds, 0.005)
+    axes = grid_axes(posterior.bounds, 0.005)
     volumes = particle_volumes(posterior, axes)
     assert len(volumes) == 3
     np.testing.assert_allclose(volumes.mean(axis=0), posterior.probability_volume(axes), atol=1e-6)
@@ -149,7 +149,7 @@ def test_a_margin_grows_it_but_not_into_space_that_was_seen_to_be_empty():
     plain = confidence_surface(posterior, observed, confidence, CONFIG)
     grown = confidence_surface(posterior, observed, confidence, CONFIG, margin, empty)
     x, radius = (grown.vertices - CENTER)[:, 0], np.linalg.norm(grown.vertices - CENTER, axis=1)
-    # Two lattice steps from the border between the two halves each keeps to its own rule.
+    # Two grid steps from the border between the two halves each keeps to its own rule.
     assert radius[x > 0.006].mean() == pytest.approx(reach(plain), abs=5e-4)
     assert radius[x < -0.006].mean() == pytest.approx(reach(plain) + margin, abs=0.002)
     assert radius.max() > 0.05, "it goes on where the posterior's box ends"

@@ -3,27 +3,22 @@
 from __future__ import annotations
 
 import json
-import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
 import torch
-from click.testing import CliRunner
-from table_scene import box, in_camera, photograph, placed
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "tools"))
-
 from benchmark import main
+from click.testing import CliRunner
 from plain.density import dense_features, gradient, hinge_points, log_posterior, mean_bce
 from plain.svgd import stein_direction as plain_direction
 from speed.frames import with_objects, with_pixels
+from table_scene import box, in_camera, photograph, placed
 
 from brrp_cli.frames.npz import save_frame
 from brrp_cli.inference.density import Lambdas, Samples, log_density, logistic_score
 from brrp_cli.inference.hinge import HingeGrid, cubic_grid, factors, features
 from brrp_cli.inference.svgd import stein_direction
-from brrp_cli.prior.build import build_prior
+from brrp_cli.prior.build.build import build_prior
 from brrp_cli.prior.parameters import BuildParameters
 
 PER_AXIS, HALF_WIDTH, FLOOR = 5, 0.15, 1e-7

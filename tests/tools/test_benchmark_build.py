@@ -3,15 +3,10 @@
 from __future__ import annotations
 
 import json
-import sys
-from pathlib import Path
-
-from click.testing import CliRunner
-from table_scene import box
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "tools"))
 
 from benchmark_build import main
+from click.testing import CliRunner
+from table_scene import box
 
 from brrp_cli.threads import cores
 

@@ -1,12 +1,6 @@
-import sys
-from pathlib import Path
-
 import numpy as np
 import pytest
 import trimesh
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "tools"))
-
 from export_random_shapes import one_solid
 
 

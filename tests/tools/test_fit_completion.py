@@ -1,21 +1,14 @@
 """The network of completion is fitted by a command, on scenes."""
 
-import sys
-from pathlib import Path
-
 import numpy as np
 import pytest
 from click.testing import CliRunner
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "tools"))
-sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "evaluation"))
-
 from fit_completion import Examples, fit, look, main
 from tiny_scenes import write_meshes, write_scene
 
-from brrp_cli.completion.around import COUNT
 from brrp_cli.completion.network import from_bytes
-from brrp_cli.evaluation.scenes import find_scenes
+from brrp_cli.completion.point_features import COUNT
+from brrp_cli.ground_truth.scenes import find_scenes
 
 
 @pytest.fixture(scope="module")
@@ -37,7 +30,7 @@ def examples(count, seed):
 def test_what_can_be_learned_is_learned_and_a_seed_gives_one_network():
     train, held = examples(20_000, 0), examples(4_000, 1)
     network = fit(train, held, 20, 0)
-    found = network.logits(held.lengths) > 0
+    found = network.logits(held.point_features) > 0
     assert (found == held.inside).mean() > 0.95
     assert fit(train, held, 20, 0).as_bytes() == network.as_bytes()
 
@@ -45,8 +38,8 @@ def test_what_can_be_learned_is_learned_and_a_seed_gives_one_network():
 def test_points_in_a_scene_are_told_from_those_outside(data):
     scene = find_scenes(data / "scenes")[0]
     both = look(scene, data, (), 1, 0)
-    assert both.lengths.shape == (len(both.inside), COUNT)
-    assert np.isfinite(both.lengths).all()
+    assert both.point_features.shape == (len(both.inside), COUNT)
+    assert np.isfinite(both.point_features).all()
     assert 0.1 < both.inside.mean() < 0.9
     assert len(look(scene, data, ("can",), 1, 0).inside) > 0
     assert len(look(scene, data, ("mug",), 1, 0).inside) == 0

@@ -1,5 +1,4 @@
 import json
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +8,6 @@ from click.testing import CliRunner
 from PIL import Image
 
 pytest.importorskip("pybullet")
-sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "tools"))
 
 from make_scenes import main
 from tabletop.models import find_meshes, load_model
@@ -18,8 +16,8 @@ from tabletop.scene import Plan, make_scene, noisy_buffer
 from tabletop.settle import drop
 
 from brrp_cli.errors import MeshError
-from brrp_cli.evaluation.scenes import find_scenes, true_mesh
 from brrp_cli.geometry import transform_points
+from brrp_cli.ground_truth.scenes import find_scenes, true_mesh
 
 SIZE = "160x120"
 

@@ -2,21 +2,16 @@
 
 from __future__ import annotations
 
-import sys
-from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from ros2_node import answer, triangles_of
 from table_scene import SHAPE, T_CAM_WORLD, K, in_camera, photograph
 
 from brrp_cli import Reconstructor
 from brrp_cli.errors import FrameError
 from brrp_cli.shapes import solids
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "tools"))
-
-from ros2_node import answer, triangles_of
 
 
 def message(array: np.ndarray, encoding: str) -> SimpleNamespace:

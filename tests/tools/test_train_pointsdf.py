@@ -1,19 +1,13 @@
 """The training command on two small scenes, as people run it."""
 
 import json
-import sys
-from pathlib import Path
 
 import pytest
 from click.testing import CliRunner
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "tools"))
-sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "pointsdf"))
-
 from eight_objects import MESHES, write_scenes
 from train_pointsdf import main
 
-from brrp_cli.pointsdf.weights import load_weights
+from brrp_cli.methods.pointsdf.weights import load_weights
 
 SMALL = ["--width", "0.02", "--queries", "32", "--batch", "4", "--truth", "exact", "--every", "1"]
 

@@ -166,7 +166,7 @@ def small_prior() -> tuple[bytes, bytes, bytes]:
     import trimesh
 
     from brrp_cli.config import FeatureConfig
-    from brrp_cli.prior.build import build_prior
+    from brrp_cli.prior.build.build import build_prior
     from brrp_cli.prior.parameters import AppearanceConfig, BuildParameters, FieldConfig
 
     tiny = BuildParameters(

@@ -13,20 +13,20 @@ import atheris
 import numpy as np
 
 from brrp_cli.errors import BrrpError
-from brrp_cli.evaluation.scenes import find_scenes
-from brrp_cli.evaluation.truth import read_objects
 from brrp_cli.frames.build import make_frame
 from brrp_cli.frames.intrinsics import read_intrinsics
 from brrp_cli.frames.npz import load_frame
 from brrp_cli.frames.pixels import read_colour, read_depth, read_masks
 from brrp_cli.frames.readers import read_frame
 from brrp_cli.frames.ros_images import frame_of
-from brrp_cli.prior.descriptions import read_descriptions
+from brrp_cli.ground_truth.scenes import find_scenes
+from brrp_cli.ground_truth.truth import read_objects
+from brrp_cli.prior.build.descriptions import read_descriptions
 from brrp_cli.prior.index import INDEX_FILE, index_of, read_index
 from brrp_cli.prior.manifest import FILE, parse_manifest
 from brrp_cli.prior.shard import object_names, open_shard, read_stored
+from brrp_cli.results.read import open_result
 from brrp_cli.retrieval.table import TableRetriever
-from brrp_cli.surface.stored import open_result
 from fuzzing.place import PRIOR, REPLACED, WORK, written
 
 DTYPES = ("<f4", "<f8", "<u2", "|u1", "<i8", "<f2", "|b1", "<c8", "<U3", "<M8[s]", ">f4", ">u2")

@@ -8,8 +8,8 @@ import numpy as np
 
 from brrp_cli.config import Config
 from brrp_cli.frames.frame import Frame
-from brrp_cli.frames.observe import observe
 from brrp_cli.geometry import transform_points
+from brrp_cli.observation.ray_samples import observe
 from brrp_cli.prior.store import Prior
 from brrp_cli.retrieval.base import Retriever, top_k
 from plain.registration import register

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import torch
 
-from brrp_cli.completion.around import COUNT
+from brrp_cli.completion.point_features import COUNT
 from brrp_cli.config import Config
 from brrp_cli.registration.model import COARSE
 from brrp_cli.threads import cores

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from brrp_cli.dependencies import import_open3d
 from brrp_cli.errors import SceneError
-from brrp_cli.evaluation.truth import read_objects, true_mesh
+from brrp_cli.ground_truth.truth import read_objects, true_mesh
 
 MAX_PIXELS = 2000  # of one object; more would only take longer
 MIN_PIXELS = 16

@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from brrp_cli.depth_noise.structured_light import add_depth_noise
 from brrp_cli.errors import SceneError
 from brrp_cli.files import atomic_folder
-from brrp_cli.frames.noise import add_depth_noise
 from brrp_cli.frames.published import depth_from_buffer, intrinsics_from_projection
 from brrp_cli.seeds import child_rng
 from tabletop.check import CLEAN, STRUCTURED_LIGHT, Distance, check_scene

@@ -5,9 +5,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from brrp_cli.frames.dump import COLOUR_ENDINGS, DEPTH_ENDINGS, by_name, images_in, read_pair
 from brrp_cli.frames.format import Format, Request
 from brrp_cli.frames.frame import Frame
+from brrp_cli.frames.recordings import COLOUR_ENDINGS, DEPTH_ENDINGS, by_name, images_in, read_pair
 
 INTRINSICS = "intrinsic.json"
 

@@ -10,9 +10,9 @@ import re
 from pathlib import Path
 
 from brrp_cli.errors import FrameError
-from brrp_cli.frames.dump import COLOUR_ENDINGS, DEPTH_ENDINGS, by_name, images_in, read_pair
 from brrp_cli.frames.format import Format, Request
 from brrp_cli.frames.frame import Frame
+from brrp_cli.frames.recordings import COLOUR_ENDINGS, DEPTH_ENDINGS, by_name, images_in, read_pair
 
 _COLOUR = re.compile(r"^(.*?)[-_.]?(?:color|colour|rgb)$", re.IGNORECASE)
 _DEPTH = re.compile(r"^(.*?)[-_.]?depth$", re.IGNORECASE)

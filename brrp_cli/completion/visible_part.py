@@ -1,0 +1,136 @@
+"""One object as far as a frame shows it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from brrp_cli.completion.convex_hull import hull_facets, outside_hull
+from brrp_cli.completion.height_map import HeightMap, height_map_over
+from brrp_cli.completion.silhouette import Image, silhouettes
+from brrp_cli.config import CompletionConfig
+from brrp_cli.frames.frame import Frame
+from brrp_cli.geometry import normalise
+from brrp_cli.observation.subsample import grid_subsample
+from brrp_cli.observation.support_plane import Plane
+
+Array = NDArray[np.float64]
+
+# Of the image: as good a guess as any where there is no plane.
+UPRIGHT = np.array([0.0, -1.0, 0.0])
+# Metres; smaller extents are as noisy as depth is.
+LEAST = 0.005
+# Shares of the seen points between which an object's size is taken: strays do not count.
+MOST = (0.02, 0.98)
+# Seen points whose spread gives a normal.
+NEIGHBOURS = 12
+
+
+@dataclass(frozen=True)
+class VisiblePart:
+    """Metres, camera frame.
+
+    seen : (n, 3) observed points, thinned; feet : (m, 3) theirs on the plane, none without one
+    facets : (f, 4) of the hull of both, outward unit normal and offset
+    height_map : None without a plane
+    size : diagonal of the box of the seen points; top : the height of the highest over the plane
+    ahead, across : (3,) unit directions along the plane, away from the camera and across; front,
+    back : where the seen points begin and end ahead; middle, width : of them across
+    depths : (n,) how deep the seen points lie in the hull: much of a cup's inside does
+    normals : (n, 3) of the seen points, unit, towards the camera
+    silhouette, limbs : (H, W) pixels, of silhouette.py
+    """
+
+    frame: Frame
+    object_id: int
+    plane: Plane | None
+    seen: Array
+    feet: Array
+    facets: Array
+    height_map: HeightMap | None
+    size: float
+    top: float
+    ahead: Array
+    across: Array
+    front: float
+    back: float
+    middle: float
+    width: float
+    depths: Array
+    normals: Array
+    silhouette: Image
+    limbs: Image
+
+    @property
+    def up(self) -> Array:
+        """(3,) unit, away from the plane."""
+        return UPRIGHT if self.plane is None else self.plane.normal
+
+    @property
+    def extent(self) -> Array:
+        """(n + m, 3) points that span what is likely to be the object."""
+        return np.concatenate([self.seen, self.feet])
+
+
+def visible_part(
+    points: NDArray[np.floating],
+    frame: Frame,
+    object_id: int,
+    plane: Plane | None,
+    config: CompletionConfig,
+) -> VisiblePart:
+    """From an object's observed points (n, 3), metres, camera frame, and its support plane."""
+    seen = grid_subsample(points, config.cell).astype(np.float64)
+    low, high = np.quantile(seen, MOST, axis=0)
+    size = max(float(np.linalg.norm(high - low)), LEAST)
+    up = UPRIGHT if plane is None else plane.normal
+    if plane is None:
+        feet, height_map, top = np.zeros((0, 3)), None, size / 2
+    else:
+        height = np.maximum(plane.signed_distance(seen), 0.0)
+        feet = seen - height[:, None] * up
+        height_map = height_map_over(points, plane, config)
+        top = float(np.quantile(height, MOST[1]))
+    silhouette, limbs = silhouettes(frame, object_id)
+    facets = hull_facets(np.concatenate([seen, feet]))
+    sight = seen.mean(axis=0)
+    across = normalise(np.cross(up, sight))
+    ahead = np.cross(across, up)
+    front, back = np.quantile(seen @ ahead, MOST)
+    left, right = np.quantile(seen @ across, MOST)
+    return VisiblePart(
+        frame=frame,
+        object_id=object_id,
+        plane=plane,
+        seen=seen,
+        feet=feet,
+        facets=facets,
+        height_map=height_map,
+        size=size,
+        top=top,
+        ahead=ahead,
+        across=across,
+        front=float(front),
+        back=float(back),
+        middle=float(left + right) / 2,
+        width=max(float(right - left), LEAST),
+        depths=-outside_hull(seen, facets),
+        normals=surface_normals(seen),
+        silhouette=silhouette,
+        limbs=limbs,
+    )
+
+
+def surface_normals(seen: Array) -> Array:
+    """Unit normals (n, 3), towards the camera, of points (n, 3), camera frame: the direction in
+    which a point's neighbours vary least."""
+    count = min(NEIGHBOURS, len(seen))
+    _, rows = cKDTree(seen).query(seen, k=[*range(1, count + 1)])
+    near = seen[rows] - seen[rows].mean(axis=1, keepdims=True)
+    _, directions = np.linalg.eigh(np.einsum("nki,nkj->nij", near, near))
+    normals = directions[:, :, 0]
+    away = (normals * seen).sum(axis=1, keepdims=True) > 0
+    return np.where(away, -normals, normals)

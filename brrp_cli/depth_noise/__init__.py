@@ -1,0 +1,1 @@
+"""Simulated noise of depth cameras: what a sensor makes of exact depth."""

@@ -1,0 +1,1 @@
+"""Descriptors of shape and colour: FPFH, colour histograms, point pairs, metric extents."""

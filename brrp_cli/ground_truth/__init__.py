@@ -1,0 +1,1 @@
+"""Ground truth: scenes with known objects, exact meshes, metrics of shape."""

@@ -1,0 +1,83 @@
+"""The true meshes, closed: as the published tables close them, and as they are.
+
+Closing takes seconds a mesh, so that it is done once and kept on disk by the content of the mesh.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from brrp_cli.files import atomic_path
+from brrp_cli.ground_truth.truth import TrueObject, true_mesh
+from brrp_cli.ground_truth.watertight import (
+    CHAMFER_RESOLUTION,
+    IOU_RESOLUTION,
+    content_hash,
+    published_truth,
+)
+
+if TYPE_CHECKING:
+    import trimesh
+
+
+@dataclass(frozen=True)
+class ClosedMeshes:
+    """One object's true mesh, closed in three ways, all in one frame.
+
+    exact : repaired, neither thickened nor smoothed
+    for_iou, for_chamfer : as the published tables close it, which thickens thin walls
+    """
+
+    exact: trimesh.Trimesh
+    for_iou: trimesh.Trimesh
+    for_chamfer: trimesh.Trimesh
+
+    def moved(self, T_target_source: np.ndarray) -> ClosedMeshes:
+        """The same in another frame."""
+        return ClosedMeshes(
+            *(
+                mesh.copy().apply_transform(T_target_source)
+                for mesh in (self.exact, self.for_iou, self.for_chamfer)
+            )
+        )
+
+
+def truth_cache() -> Path:
+    """Where closed meshes are kept."""
+    import platformdirs
+
+    return Path(platformdirs.user_cache_dir("brrp")) / "truth"
+
+
+def close_truth(true_object: TrueObject, data_root: Path | None, cache: Path) -> ClosedMeshes:
+    """The object's closed meshes in world metres.
+
+    They are closed in the frame of their file, whose axes decide how the published way thickens.
+    Errors: SceneError if the mesh is missing or does not load, MeshError if nothing closes it.
+    """
+    mesh = true_mesh(replace(true_object, T_world_object=np.eye(4)), data_root)
+    closed = ClosedMeshes(
+        exact=_repaired(mesh, cache),
+        for_iou=published_truth(mesh, IOU_RESOLUTION, cache),
+        for_chamfer=published_truth(mesh, CHAMFER_RESOLUTION, cache),
+    )
+    return closed.moved(true_object.T_world_object)
+
+
+def _repaired(mesh: trimesh.Trimesh, cache: Path) -> trimesh.Trimesh:
+    import trimesh
+
+    from brrp_cli.prior.build.repair import repair
+
+    kept = cache / f"{content_hash(mesh)}-exact.npz"
+    if kept.exists():
+        with np.load(kept, allow_pickle=False) as arrays:
+            return trimesh.Trimesh(arrays["vertices"], arrays["faces"], process=False)
+    closed = repair(mesh).mesh
+    with atomic_path(kept) as partial:
+        np.savez_compressed(partial, vertices=closed.vertices, faces=closed.faces)
+    return closed

@@ -1,0 +1,1 @@
+"""PointSDF, the learned baseline: a network from a seen cloud to occupancy."""

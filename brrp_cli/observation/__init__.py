@@ -1,0 +1,1 @@
+"""Observation: the support plane, and what a frame says of occupied and free space."""

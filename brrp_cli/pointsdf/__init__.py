@@ -1,1 +1,0 @@
-"""PointSDF, a learned baseline: a network from a seen cloud to occupancy; weights, training."""

@@ -1,0 +1,1 @@
+"""Building a prior, offline: from mesh files to shards and a manifest."""

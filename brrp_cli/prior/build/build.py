@@ -1,0 +1,307 @@
+"""Build a prior from a folder of meshes: only what is missing or changed, whatever fails."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+from brrp_cli.errors import BrrpError, DependencyError, MeshError, PriorError
+from brrp_cli.executors import run_tasks
+from brrp_cli.files import sha256_file
+from brrp_cli.prior.appearance_file import is_whole, sidecar_file, write_sidecar
+from brrp_cli.prior.appearance_index import open_appearance_index
+from brrp_cli.prior.build.descriptions import describe, read_descriptions
+from brrp_cli.prior.build.find_meshes import MeshSource, find_meshes
+from brrp_cli.prior.build.lock import only_builder
+from brrp_cli.prior.build.make_object import make_object
+from brrp_cli.prior.build.mesh_files import input_sha256
+from brrp_cli.prior.build.reuse import Finished, Reusable, reusable_objects
+from brrp_cli.prior.build.shard_plan import plan_shards, shard_file
+from brrp_cli.prior.index import read_index
+from brrp_cli.prior.manifest import (
+    FILE,
+    Failure,
+    ForeignManifestError,
+    Manifest,
+    ObjectEntry,
+    ShardEntry,
+    read_manifest,
+    write_manifest,
+)
+from brrp_cli.prior.pack import pack
+from brrp_cli.prior.parameters import BuildParameters, refuse_differences
+from brrp_cli.prior.shard import StoredObject, open_shard, read_stored, write_shard
+from brrp_cli.stop import sigterm_raises, stopped
+from brrp_cli.threads import cores
+
+# No mesh that ever gets done takes this long; pymeshlab can loop for ever on some.
+TIME_LIMIT = 900.0
+
+log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True)
+class BuildReport:
+    """What a build did. `made`, `kept`, `removed`: names of objects."""
+
+    path: Path
+    manifest: Manifest
+    made: list[str]
+    kept: list[str]
+    removed: list[str]
+
+
+def build_prior(
+    meshes: Path,
+    out: Path,
+    parameters: BuildParameters | None = None,
+    *,
+    descriptions: Path | None = None,
+    workers: int | None = None,
+    overwrite: bool = False,
+    time_limit: float = TIME_LIMIT,
+    progress: bool = False,
+) -> BuildReport:
+    """Make the prior in `out` hold the objects of the folder `meshes`, and no others.
+
+    The same meshes and parameters give the same bytes, however many workers run and however often
+    the build was interrupted. Errors: MeshError when there are no meshes or all of them fail;
+    PriorError when the prior there has other parameters (and not `overwrite`) or another build is
+    at work on it; StoppedError after Ctrl-C or SIGTERM, which keeps what is finished; OutputError.
+    """
+    table = (parameters or BuildParameters()).as_dict()
+    sources = {source.name: source for source in find_meshes(meshes)}
+    given = read_descriptions(descriptions) if descriptions else {}
+    phrases = describe(sources, given)
+    with _stop_told(out), sigterm_raises(), only_builder(out):
+        before = _previous(out)
+        if before is not None and not overwrite:
+            refuse_differences(before.parameters, table, out)
+        run = _Run(out, table, sources, reusable_objects(out, before, table))
+        run.hash_inputs()
+        run.make(parameters or BuildParameters(), workers or cores(), time_limit, progress)
+        manifest = run.with_sidecar(run.manifest(phrases), before)
+        if not manifest.objects:
+            raise MeshError(
+                "None of the meshes became an object",
+                where=meshes,
+                found="\n".join(f"{f.source}: {f.reason}" for f in manifest.failed),
+            )
+        if before is None or before.as_bytes() != manifest.as_bytes():
+            write_manifest(out, manifest)
+        # Now, so that not the first to open the prior pays for it.
+        open_appearance_index(out, read_index(out), lambda: manifest)
+        _sweep(out, manifest)
+    names = {entry.name for entry in manifest.objects}
+    return BuildReport(
+        path=out,
+        manifest=manifest,
+        made=sorted(run.made),
+        kept=sorted(names - set(run.made)),
+        removed=sorted({e.name for e in before.objects} - names if before else ()),
+    )
+
+
+GO_ON = "run the same command again to go on"
+
+
+@contextmanager
+def _stop_told(out: Path) -> Iterator[None]:
+    """Ctrl-C or SIGTERM becomes a StoppedError, wherever it came."""
+    try:
+        yield
+    except KeyboardInterrupt as stop:
+        raise stopped(stop, where=out, found="what was finished is kept", fix=GO_ON) from None
+
+
+@dataclass
+class _Run:
+    """What is known while a build goes on, by name of object."""
+
+    out: Path
+    parameters: dict[str, Any]
+    sources: dict[str, MeshSource]
+    stock: Reusable
+    hashes: dict[str, str] = field(default_factory=dict)
+    failed: dict[str, str] = field(default_factory=dict)
+    made: dict[str, None] = field(default_factory=dict)
+    waiting: dict[str, StoredObject] = field(default_factory=dict)
+    done: dict[str, Finished] = field(default_factory=dict)
+
+    def hash_inputs(self) -> None:
+        """sha256 of what each object is made from; what cannot be read has failed."""
+        for name, source in self.sources.items():
+            try:
+                self.hashes[name] = input_sha256(source.path)
+            except OSError as error:
+                self.failed[name] = f"The mesh file cannot be read: {error.strerror}"
+            except MeshError as error:
+                self.failed[name] = _reason(error, source)
+
+    def make(
+        self, parameters: BuildParameters, workers: int, time_limit: float, progress: bool
+    ) -> None:
+        """Make what is not in stock; write each shard when the last of its members is there."""
+        from tqdm import tqdm
+
+        groups = plan_shards(list(self.hashes))
+        group_of = {name: group for group in groups for name in group}
+        todo = [n for group in groups for n in group if (n, self.hashes[n]) not in self.stock]
+        left = {id(group): len(set(group) & set(todo)) for group in groups}
+        for group in groups:
+            if not left[id(group)]:
+                self._write(group)
+        tasks = [(self.sources[name], self.hashes[name], parameters) for name in todo]
+        results = run_tasks(make_stored, tasks, min(workers, len(todo)), time_limit)
+        try:
+            for index, result in tqdm(
+                results, total=len(todo), desc="objects", disable=not progress or not todo
+            ):
+                self._take(todo[index], result)
+                group = group_of[todo[index]]
+                left[id(group)] -= 1
+                if not left[id(group)]:
+                    self._write(group)
+        except KeyboardInterrupt as stop:
+            for group in groups:
+                if self.waiting.keys() & set(group):
+                    self._write(group)
+            raise stopped(
+                stop,
+                where=self.out,
+                found=f"{len(self.made)} of {len(todo)} objects made in this run; they are kept",
+                fix=GO_ON,
+            ) from None
+        finally:
+            results.close()
+
+    def _take(self, name: str, result: StoredObject | BrrpError) -> None:
+        if isinstance(result, DependencyError):
+            raise result
+        if isinstance(result, BrrpError):
+            self.failed[name] = _reason(result, self.sources[name])
+        else:
+            self.waiting[name] = result
+            self.made[name] = None
+
+    def _write(self, group: list[str]) -> None:
+        """Write the shard of those members that are there, unless it stands already."""
+        here = [
+            (name, self.hashes[name])
+            for name in group
+            if name in self.waiting or (name, self.hashes[name]) in self.stock
+        ]
+        if not here:
+            return
+        file = shard_file(self.parameters, here)
+        if any(name in self.waiting or self.stock[name, sha].shard != file for name, sha in here):
+            objects = [self._stored(name, sha) for name, sha in here]
+            write_shard(self.out / file, objects, self.parameters)
+            records = [stored.record for stored in objects]
+            # Not before: Ctrl-C in the middle of writing must lose none of them.
+            for name, _ in here:
+                self.waiting.pop(name, None)
+        else:
+            records = [self.stock[key].record for key in here]
+        for (name, _), record in zip(here, records, strict=True):
+            self.done[name] = Finished(file, record)
+
+    def _stored(self, name: str, sha256: str) -> StoredObject:
+        if name in self.waiting:
+            return self.waiting[name]
+        with open_shard(self.out / self.stock[name, sha256].shard) as shard:
+            return read_stored(shard, name)
+
+    def manifest(self, phrases: dict[str, str]) -> Manifest:
+        """All that stands now."""
+        files = sorted({finished.shard for finished in self.done.values()})
+        paths = {file: self.out / file for file in files}
+        return Manifest(
+            parameters=self.parameters,
+            objects=[
+                ObjectEntry(
+                    name=name,
+                    description=phrases[name],
+                    source=self.sources[name].relative,
+                    input_sha256=self.hashes[name],
+                    shard=self.done[name].shard,
+                    record=self.done[name].record,
+                )
+                for name in sorted(self.done)
+            ],
+            shards=[ShardEntry(f, sha256_file(p), p.stat().st_size) for f, p in paths.items()],
+            failed=[
+                Failure(name, self.sources[name].relative, self.failed[name])
+                for name in sorted(self.failed)
+            ],
+        )
+
+    def with_sidecar(self, manifest: Manifest, before: Manifest | None) -> Manifest:
+        """With the file of all objects' appearance, which is written unless it stands already."""
+        if not manifest.objects:
+            return manifest
+        entry = before.appearance if before is not None else None
+        file = sidecar_file(manifest.objects, self.parameters)
+        if entry is None or entry.file != file or not is_whole(self.out, entry):
+            entry = write_sidecar(self.out, manifest.objects, self.parameters)
+        return replace(manifest, appearance=entry)
+
+
+def make_stored(source: MeshSource, sha256: str, parameters: BuildParameters) -> StoredObject:
+    """A worker's task: one mesh, as its shard holds it. Errors: MeshError."""
+    made = pack(make_object(source, parameters), sha256)
+    if input_sha256(source.path) != sha256:
+        raise MeshError(
+            "The mesh changed while the prior was built",
+            where=source.path,
+            fix="run brrp build-prior again",
+        )
+    return made
+
+
+def _reason(error: BrrpError, source: MeshSource) -> str:
+    parts = [error.what, error.found, error.fix]
+    line = "; ".join(" ".join(str(part).split()) for part in parts if part)
+    # The manifest is the same wherever the meshes lie.
+    return line.replace(str(source.path), source.relative)
+
+
+def _previous(out: Path) -> Manifest | None:
+    if not (out / FILE).is_file():
+        return None
+    try:
+        return read_manifest(out)
+    except ForeignManifestError:
+        raise
+    except PriorError:
+        return None
+
+
+def _sweep(out: Path, manifest: Manifest) -> None:
+    """Delete files that nothing refers to, and what killed runs left half written."""
+    listed = {out / shard.file for shard in manifest.shards}
+    if manifest.appearance is not None:
+        path = out / manifest.appearance.file
+        listed |= {path, path.with_suffix(".npz")}
+    for path in [
+        *(out / "shards").glob("shard-*.h5"),
+        *(out / "shards").glob(".shard-*.partial.h5"),
+        *out.glob("appearance-*.np[yz]"),
+        *out.glob(".appearance-*.partial.np[yz]"),
+    ]:
+        if path not in listed:
+            _delete(path)
+    for path in out.glob(".manifest.*.partial.*"):
+        _delete(path)
+
+
+def _delete(path: Path) -> None:
+    """The prior is whole without it: what cannot be deleted is a line of `brrp verify`."""
+    try:
+        path.unlink(missing_ok=True)
+    except OSError as error:
+        log.warning("%s cannot be deleted: %s", path, error.strerror)

@@ -1,0 +1,85 @@
+"""Short phrases that tell CLIP what an object looks like ("a red cracker box")."""
+
+from __future__ import annotations
+
+import csv
+import re
+import tomllib
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+from brrp_cli.errors import PriorError
+from brrp_cli.files import parse_json
+
+YCB_MANIFEST = Path(__file__).parents[2] / "data_manifests" / "ycb.toml"
+
+
+def phrase_from_name(name: str) -> str:
+    """A phrase from a file's name: `big_red_cup` gives "a big red cup"."""
+    text = re.sub(r"(?<=[a-z])(?=[A-Z])", " ", name)
+    text = re.sub(r"[_\-.\s]+", " ", text).strip().lower()
+    # Catalogue numbers before a word ("035 power drill") say nothing about looks.
+    text = re.sub(r"^(\d+ )+(?=[a-z])", "", text)
+    if not re.search("[a-z]", text):
+        return "an object"
+    article = "an" if text[0] in "aeiou" else "a"
+    return f"{article} {text}"
+
+
+def read_descriptions(path: Path) -> dict[str, str]:
+    """Name -> phrase from a TOML, JSON or CSV file.
+
+    TOML and JSON: one table of phrases, alone or under the key `descriptions`; CSV: two columns,
+    name and phrase, without a heading. Errors: PriorError.
+    """
+    try:
+        text = path.read_text(encoding="utf-8")
+        table: Any
+        if path.suffix.lower() == ".toml":
+            table = tomllib.loads(text)
+        elif path.suffix.lower() == ".json":
+            table = parse_json(text)
+        elif path.suffix.lower() == ".csv":
+            table = _read_csv(text)
+        else:
+            raise PriorError(
+                "Descriptions in an unknown format", where=path, expected=".toml, .json or .csv"
+            )
+    except (OSError, ValueError, csv.Error) as error:
+        raise PriorError("Cannot read the descriptions", where=path, found=error) from error
+    if isinstance(table, dict) and isinstance(table.get("descriptions"), dict):
+        table = table["descriptions"]
+    if not isinstance(table, dict):
+        raise PriorError(
+            "The descriptions are no table",
+            where=path,
+            expected="name -> phrase",
+            found=type(table),
+        )
+    for name, phrase in table.items():
+        if not isinstance(phrase, str) or not phrase.strip():
+            raise PriorError(
+                "A description is no phrase",
+                where=f"{path}, {name}",
+                expected='words such as "a red cracker box"',
+                found=repr(phrase),
+            )
+    return {name: phrase.strip() for name, phrase in table.items()}
+
+
+def _read_csv(text: str) -> dict[str, str]:
+    table = {}
+    for number, row in enumerate(csv.reader(text.splitlines()), start=1):
+        if not row:
+            continue
+        if len(row) != 2:
+            raise ValueError(f"row {number} has {len(row)} columns, expected: name,phrase")
+        table[row[0].strip()] = row[1]
+    return table
+
+
+def describe(names: Iterable[str], given: dict[str, str]) -> dict[str, str]:
+    """A phrase for each name: from `given`, else from the YCB manifest, else from the name."""
+    known = {**read_descriptions(YCB_MANIFEST), **given}
+    return {name: known.get(name) or phrase_from_name(name) for name in names}

@@ -1,0 +1,121 @@
+"""What every method gives back: for each object, occupancy probability at points."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    import trimesh
+
+Axes = tuple[NDArray[np.floating], NDArray[np.floating], NDArray[np.floating]]
+
+OK = "ok"
+TOO_FEW_POINTS = "too_few_points"
+NO_SURFACE = "no_surface"
+FAILED = "failed"
+
+# Units of uncertainty on a surface: standard deviation of its place, or variance of the logit.
+METRES = "metre"
+LOGIT_VARIANCE = "logit^2"
+
+
+class OccupancyPosterior(Protocol):
+    """A distribution over one object's shape, in the camera frame.
+
+    `bounds` is the box outside of which the method says nothing and occupancy counts as 0.
+    """
+
+    @property
+    def bounds(self) -> NDArray[np.float64]:
+        """(2, 3) metres, camera frame: lower and upper corner."""
+
+    def probability(self, points: NDArray[np.floating]) -> NDArray[np.float32]:
+        """Occupancy probability (n,) at points (n, 3), metres, camera frame."""
+
+    def probability_volume(self, axes: Axes) -> NDArray[np.float32]:
+        """Occupancy probability (nx, ny, nz) on a grid of camera-frame coordinates, metres."""
+
+    @property
+    def surface_unit(self) -> str:
+        """Unit of `surface_uncertainty`: METRES or LOGIT_VARIANCE."""
+
+    def uncertainty(self, points: NDArray[np.floating]) -> NDArray[np.float32]:
+        """How unsure (n,), >= 0, in the method's own unit: what ranks errors of occupancy."""
+
+    def surface_uncertainty(self, vertices: NDArray[np.floating]) -> NDArray[np.float32]:
+        """How unsure (n,), >= 0, the surface is at its own vertices (n, 3), where occupancy is 0.5
+        everywhere; in `surface_unit`."""
+
+
+@dataclass(frozen=True)
+class Surface:
+    """A closed, outward triangle mesh.
+
+    vertices : (n, 3) float64, metres, camera frame; faces : (m, 3) int64; uncertainty : (n,)
+    float32, the posterior's uncertainty at each vertex, in `uncertainty_unit`.
+    """
+
+    vertices: NDArray[np.float64]
+    faces: NDArray[np.int64]
+    uncertainty: NDArray[np.float32]
+    uncertainty_unit: str
+
+    def as_trimesh(self) -> trimesh.Trimesh:
+        """The same as a trimesh, vertices in the same order."""
+        import trimesh
+
+        return trimesh.Trimesh(self.vertices, self.faces, process=False)
+
+
+@dataclass
+class Retrieved:
+    """One stored object that was retrieved for one seen object.
+
+    T_cam_object maps the stored object's normalised coordinates to the camera frame (a
+    similarity); None where registration found no inlier. fitness: share of observed points with
+    an inlier, 0 to 1. alignment_score : what the frame says for the best placement, 1 at best;
+    weight : of the object in the posterior; both None where placements are not verified.
+    """
+
+    name: str
+    probability: float
+    T_cam_object: NDArray[np.float64] | None = None
+    scale: float | None = None
+    inliers: int = 0
+    fitness: float = 0.0
+    alignment_score: float | None = None
+    weight: float | None = None
+
+
+@dataclass
+class ObjectReconstruction:
+    """What is known of one object after inference.
+
+    Attributes
+    ----------
+    status : "ok", or why there is no surface: "too_few_points", "no_surface", "failed"
+    message : for people; may also qualify an "ok"
+    n_points : valid observed points; observed : (n, 3) those points, metres, camera frame;
+    center : (3,) centre of their bounding box
+    unknown_weight : of that in the posterior; None where it has none
+    posterior, surface : None unless the object got that far
+    unknown_probability : that the prior does not hold the object; 0 where retrieval cannot tell
+    seconds : time of each stage
+    """
+
+    object_id: int
+    status: str
+    message: str = ""
+    n_points: int = 0
+    center: NDArray[np.float64] | None = None
+    observed: NDArray[np.float32] | None = None
+    retrieved: list[Retrieved] = field(default_factory=list)
+    unknown_probability: float = 0.0
+    unknown_weight: float | None = None
+    posterior: OccupancyPosterior | None = None
+    surface: Surface | None = None
+    seconds: dict[str, float] = field(default_factory=dict)

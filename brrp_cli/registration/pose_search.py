@@ -1,0 +1,167 @@
+"""Many hypotheses of where a stored object is: begin widely, refine the best, verify all.
+
+The paper's scan (scan.py) takes the one placement with most inlier pairs, at ten fixed sizes. Here
+a stored object keeps its own size, or one near it; initial are resting poses turned about the
+table's normal and feature matchings; what decides is what the whole image says (verifier.py).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brrp_cli.config import FeatureConfig, SearchConfig
+from brrp_cli.geometry import transform_points
+from brrp_cli.registration.initial_poses import feature_matched_poses, resting_initial_poses
+from brrp_cli.registration.model import COARSE, Model
+from brrp_cli.registration.scale_scan import ObservedCloud
+from brrp_cli.registration.sdf_refinement import refine_to_sdf
+from brrp_cli.registration.verification import Verifier
+
+Array = NDArray[np.float64]
+
+# The first look at all initial takes one point of so many, and leaves so many times what slides.
+COARSE_SHARE, COARSE_FACTOR = 3, 2
+
+
+@dataclass(frozen=True)
+class Hypothesis:
+    """A stored object placed in the scene.
+
+    T_cam_model : (4, 4) similarity from the model (metres, true size); scale : of it, 1 is the true
+    size; alignment_score : what the frame says of it, 1 at best, less what its scale costs
+    """
+
+    model: Model
+    T_cam_model: Array
+    scale: float
+    alignment_score: float
+
+    @property
+    def T_cam_object(self) -> Array:
+        """(4, 4) similarity from the stored object's normalised coordinates."""
+        return np.asarray(self.T_cam_model @ self.model.T_model_object)
+
+
+def search(
+    model: Model,
+    observed: ObservedCloud,
+    verifier: Verifier,
+    features: FeatureConfig,
+    config: SearchConfig,
+    seed: int,
+    best: float = -np.inf,
+) -> list[Hypothesis]:
+    """The best placements of one model that differ in shape, best first, `config.kept` at most.
+
+    best : alignment score that another model has reached
+    """
+    initial = feature_matched_poses(
+        model, observed, features, config.matching, config.matchings, seed
+    )
+    if verifier.plane is not None:
+        initial += resting_initial_poses(model, verifier.points, verifier.plane, config.turns)
+    T = np.stack(initial)
+    T, _ = _best(T, model, verifier, config, COARSE_FACTOR * config.coarse, COARSE_SHARE)
+    T, _ = _best(T, model, verifier, config, config.coarse)
+    T = _refined(
+        T, model, verifier, config.coarse_points, config.coarse_distance, config.coarse_steps
+    )
+    least = max(config.hopeless, best - config.beaten)
+    for count, points, distance, steps in (
+        (config.middle, config.middle_points, config.coarse_distance, config.middle_steps),
+        (config.fine, config.fine_points, config.fine_distance, config.fine_steps),
+    ):
+        T, reached = _best(T, model, verifier, config, count)
+        if reached < least:
+            return _distinct(_judged(T[: config.fine], 1.0, model, verifier, config), config)
+        T = _refined(T, model, verifier, points, distance, steps)
+    found = _judged(T, 1.0, model, verifier, config)
+    parents = [each.T_cam_model for each in found[: config.rescaled]]
+    for scale in config.scales if found[0].alignment_score < config.settled else ():
+        resized = np.stack([_resize(parent, scale, verifier) for parent in parents])
+        resized = _refined(
+            resized,
+            model,
+            verifier,
+            config.middle_points,
+            config.scale_distance,
+            config.middle_steps,
+        )
+        found += _judged(resized, scale, model, verifier, config)
+    return _distinct(sorted(found, key=lambda each: -each.alignment_score), config)
+
+
+def _distinct(found: list[Hypothesis], config: SearchConfig) -> list[Hypothesis]:
+    """Without those whose surface lies within `config.distinct` metres, on average, of that of a
+    better one: a ball turned about its middle is one hypothesis, not many."""
+    kept: list[Hypothesis] = []
+    for each in found:
+        surface = transform_points(each.T_cam_model, each.model.surface[:COARSE])
+        apart = (
+            np.abs(other.model.signed_distance(transform_points(T_model_cam, surface))).mean()
+            for other in kept
+            for T_model_cam in [np.linalg.inv(other.T_cam_model)]
+        )
+        if all(distance > config.distinct for distance in apart):
+            kept.append(each)
+        if len(kept) == config.kept:
+            break
+    return kept
+
+
+def _best(
+    T_cam_model: Array,
+    model: Model,
+    verifier: Verifier,
+    config: SearchConfig,
+    count: int,
+    share: int = 1,
+) -> tuple[Array, float]:
+    """The `count` best placements by a coarse alignment score, with one of `share` of its points,
+    and the best score."""
+    score = verifier.score(
+        T_cam_model,
+        model,
+        config.alignment_score,
+        model_points=COARSE // share,
+        seen_points=config.seen_points // share,
+    )
+    order = np.argsort(-score, kind="stable")[:count]
+    return np.asarray(T_cam_model[order]), float(score[order[0]])
+
+
+def _judged(
+    T_cam_model: Array, scale: float, model: Model, verifier: Verifier, config: SearchConfig
+) -> list[Hypothesis]:
+    score = verifier.score(
+        T_cam_model,
+        model,
+        config.alignment_score,
+        model_points=config.fine_points,
+        seen_points=config.fine_points,
+    )
+    score = score - config.scale_cost * np.log(scale) ** 2
+    found = [Hypothesis(model, T, scale, float(s)) for T, s in zip(T_cam_model, score, strict=True)]
+    return sorted(found, key=lambda each: -each.alignment_score)
+
+
+def _refined(
+    T_cam_model: Array, model: Model, verifier: Verifier, points: int, distance: float, steps: int
+) -> Array:
+    """Each placement (B, 4, 4) with so many observed points brought onto its surface; its size
+    stays. Points further from it than `distance` metres do not pull."""
+    T_model_cam = np.asarray(np.linalg.inv(T_cam_model), dtype=np.float64)
+    seen = verifier.points[:points]
+    return np.asarray(np.linalg.inv(refine_to_sdf(T_model_cam, seen, model, distance, steps)))
+
+
+def _resize(T_cam_model: Array, scale: float, verifier: Verifier) -> Array:
+    """Grown by `scale` about the middle of what is seen."""
+    center = verifier.points.mean(axis=0)
+    T = T_cam_model.copy()
+    T[:3, :3] *= scale
+    T[:3, 3] = center + scale * (T[:3, 3] - center)
+    return T

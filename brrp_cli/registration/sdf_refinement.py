@@ -1,0 +1,74 @@
+"""Refine many placements at once: observed points slide onto the model's surface.
+
+Gauss-Newton on the sum of squared signed distances, which a grid holds: point-to-plane ICP
+without a search for the nearest point, whose plane is that of the surface and not of a sample.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brrp_cli.registration.model import Model
+
+Array = NDArray[np.float64]
+
+# Placements that turn (radians) and move (metres) by less in a step stand still.
+STILL = 2e-5
+# Of the mean diagonal: what is not seen of a ball's turn is not turned.
+DAMPING = 1e-6
+
+
+def refine_to_sdf(
+    T_model_cam: Array, observed: Array, model: Model, distance: float, iterations: int
+) -> Array:
+    """T_model_cam (B, 4, 4), similarities, each followed by the rigid motion that brings observed
+    points (n, 3), metres, camera frame, onto the model's surface.
+
+    distance : points further from it than that, metres of the model, do not pull
+    iterations : steps at most; a placement that stands still is left alone before
+    """
+    T = T_model_cam.copy()
+    moving = np.arange(len(T))
+    for _ in range(iterations):
+        # The axis comes first: long contiguous rows are what NumPy is fast on.
+        points = T[moving, :3, :3].swapaxes(0, 1) @ observed.T
+        points += T[moving, :3, 3].T[..., None]
+        step = _step(points.astype(np.float32), model, distance)
+        T[moving] = _rigid(step) @ T[moving]
+        moving = moving[np.abs(step).max(axis=1) > STILL]
+        if not len(moving):
+            break
+    return T
+
+
+def _step(points: NDArray[np.float32], model: Model, distance: float) -> Array:
+    """Turn and shift (B, 6), about the model's middle, of points (3, B, n)."""
+    _, batch, count = points.shape
+    p = points.reshape(3, -1)
+    value, slope = model.distance_and_gradient(p)
+    pulls = np.abs(value) < distance
+    slope *= pulls
+    rows = np.empty((6, batch * count), np.float32)
+    for i, (j, k) in enumerate(((1, 2), (2, 0), (0, 1))):
+        rows[i] = p[j] * slope[k] - p[k] * slope[j]
+    rows[3:] = slope
+    rows = np.ascontiguousarray(rows.reshape(6, batch, count).swapaxes(0, 1))
+    normal = (rows @ rows.mT).astype(np.float64)
+    fall = rows @ value.reshape(batch, count, 1)
+    trace = np.trace(normal, axis1=1, axis2=2)[:, None, None]
+    # Nothing pulls where the trace is 0.
+    normal += (DAMPING * trace / 6 + (trace == 0)) * np.eye(6)
+    return np.asarray(-np.linalg.solve(normal, fall.astype(np.float64))[..., 0])
+
+
+def _rigid(step: Array) -> Array:
+    """(B, 4, 4) that turns by step[:, :3] (Rodrigues) and shifts by step[:, 3:]."""
+    angle = np.linalg.norm(step[:, :3], axis=1)[:, None, None]
+    x, y, z = (step[:, :3] / np.maximum(angle[:, 0], 1e-12)).T
+    zero = np.zeros_like(x)
+    K = np.stack([zero, -z, y, z, zero, -x, -y, x, zero], axis=1).reshape(-1, 3, 3)
+    T = np.tile(np.eye(4), (len(step), 1, 1))
+    T[:, :3, :3] += np.sin(angle) * K + (1 - np.cos(angle)) * (K @ K)
+    T[:, :3, 3] = step[:, 3:]
+    return T

@@ -1,0 +1,1 @@
+"""Rendering: pictures of meshes by ray casting, and the preview of a result."""

@@ -1,0 +1,166 @@
+"""preview.png: the input beside the reconstruction, from the camera and from behind."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brrp_cli.frames.frame import Frame
+from brrp_cli.reconstruction import ObjectReconstruction
+from brrp_cli.rendering.render import View, fitted, render, view_from_behind
+from brrp_cli.segmentation.mask_picture import draw_masks, object_colours
+from brrp_cli.surface.colours import (
+    scale_top,
+    spread,
+    spread_colours,
+    spread_label,
+    spread_meaning,
+)
+
+Picture = NDArray[np.uint8]
+
+PANEL_WIDTH = 480
+CAPTION = 28
+INK = (30, 30, 30)
+IMAGE_UP = np.array([0.0, -1.0, 0.0])
+NOT_STORED = "none of them"
+LEAST = 0.005  # of weights and probabilities: less reads as 0.00
+
+
+def preview(
+    frame: Frame,
+    objects: Sequence[ObjectReconstruction],
+    *,
+    up: NDArray[np.floating] | None = None,
+    caption: str = "objects",
+) -> Picture:
+    """Six panels (H, W, 3): masks, shapes from the camera and from behind; list, uncertainty.
+
+    up : (3,) the table's normal, camera frame; without one, up in the image
+    caption : stands over the list of objects
+    """
+    view = _panel_view(frame)
+    found = [o for o in objects if o.surface is not None]
+    surfaces = [o.surface for o in found if o.surface is not None]
+    up = IMAGE_UP if up is None else up
+    behind = fitted(view_from_behind(view, _middle(objects), up), surfaces)
+    top = scale_top(surfaces)
+    unsure = [spread_colours(spread(s), top) for s in surfaces]
+    colours = object_colours(frame.object_ids)
+    shapes = [
+        np.tile(colours[o.object_id], (len(o.surface.vertices), 1))
+        for o in found
+        if o.surface is not None
+    ]
+    masks = draw_masks(frame.rgb, frame.segmap)
+    meaning = spread_meaning(surfaces)
+    rows = [
+        [
+            _captioned(_resized(masks, view.shape), "input and masks"),
+            _captioned(render(surfaces, shapes, view), "reconstruction, from the camera"),
+            _captioned(render(surfaces, shapes, behind), "from behind"),
+        ],
+        [
+            _captioned(_listing(objects, view.shape), caption),
+            _captioned(
+                render(surfaces, unsure, view),
+                f"uncertainty: spread of {meaning}, from the camera",
+            ),
+            _with_scale(
+                _captioned(render(surfaces, unsure, behind), "from behind"),
+                top,
+                spread_label(top, surfaces),
+            ),
+        ],
+    ]
+    return np.vstack([np.hstack(row) for row in rows])
+
+
+def _panel_view(frame: Frame) -> View:
+    height, width = frame.shape
+    factor = PANEL_WIDTH / width
+    K = frame.K * np.array([[factor], [factor], [1.0]])
+    return View(K, np.eye(4), (round(height * factor), PANEL_WIDTH))
+
+
+def _middle(objects: Sequence[ObjectReconstruction]) -> NDArray[np.float64]:
+    centers = [o.center for o in objects if o.center is not None]
+    return np.mean(centers, axis=0) if centers else np.array([0.0, 0.0, 1.0])
+
+
+def _resized(picture: Picture, shape: tuple[int, int]) -> Picture:
+    from PIL import Image
+
+    height, width = shape
+    return np.asarray(Image.fromarray(picture).resize((width, height)))
+
+
+def _font(size: int) -> Any:
+    from PIL import ImageFont
+
+    return ImageFont.load_default(size)
+
+
+def _captioned(picture: Picture, text: str) -> Picture:
+    from PIL import Image, ImageDraw
+
+    bar = Image.new("RGB", (picture.shape[1], CAPTION), "white")
+    ImageDraw.Draw(bar).text((8, 6), text, fill=INK, font=_font(14))
+    return np.vstack([np.asarray(bar), picture])
+
+
+def _listing(objects: Sequence[ObjectReconstruction], shape: tuple[int, int]) -> Picture:
+    """Two lines for each object: id, status and weights in the posterior; what was retrieved."""
+    from PIL import Image, ImageDraw
+
+    height, width = shape
+    panel = Image.new("RGB", (width, height), "white")
+    draw = ImageDraw.Draw(panel)
+    line = min(44, (height - 8) // max(len(objects), 1))
+    size = max(8, min(13, line // 2 - 3))
+    colours = object_colours([item.object_id for item in objects])
+    for row, item in enumerate(objects):
+        y = 6 + row * line
+        colour = tuple(int(c) for c in colours[item.object_id])
+        draw.rectangle((8, y, 20, y + 12), fill=colour)
+        first, second = _told(item)
+        draw.text((26, y), first, fill=INK, font=_font(size))
+        draw.text((26, y + line // 2 - 2), second, fill=INK, font=_font(size))
+    return np.asarray(panel)
+
+
+def _told(item: ObjectReconstruction) -> tuple[str, str]:
+    first = f"{item.object_id}: {item.status}"
+    weights = [(r.weight, r.name) for r in item.retrieved if r.weight is not None]
+    if weights:
+        first += f"; weights {_ranked(weights, item.unknown_weight or 0.0)}"
+    shares = [(r.probability, r.name) for r in item.retrieved]
+    return first, _ranked(shares, item.unknown_probability) if shares else item.message
+
+
+def _ranked(shares: list[tuple[float, str]], none: float) -> str:
+    """Names with their shares, largest first: the largest, and what is at least LEAST."""
+    ranked = sorted([*shares, (none, NOT_STORED)], key=lambda each: -each[0])
+    told = [each for each in ranked if each[0] >= LEAST] or ranked[:1]
+    return ", ".join(f"{name} {share:.2f}" for share, name in told)
+
+
+def _with_scale(panel: Picture, top: float, label: str) -> Picture:
+    """The panel with a colour bar in its caption, from 0 to the spread `top`, which reads `label`.
+
+    In the picture it would hide what lies there.
+    """
+    from PIL import Image, ImageDraw
+
+    image = Image.fromarray(panel)
+    length = image.width // 3
+    left = image.width - length - 70
+    bar = np.tile(spread_colours(np.linspace(0, top, length), top)[:, :3], (10, 1, 1))
+    image.paste(Image.fromarray(bar), (left, 9))
+    draw = ImageDraw.Draw(image)
+    draw.text((left - 6, 7), "0", fill=INK, font=_font(12), anchor="ra")
+    draw.text((left + length + 6, 7), label, fill=INK, font=_font(12))
+    return np.asarray(image)

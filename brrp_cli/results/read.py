@@ -1,0 +1,207 @@
+"""A folder of results, read back."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brrp_cli.config import SurfaceConfig
+from brrp_cli.errors import ResultError
+from brrp_cli.files import parse_json
+from brrp_cli.frames.frame import Frame
+from brrp_cli.frames.npz import load_frame
+from brrp_cli.geometry import transform_points
+from brrp_cli.observation.support_plane import Plane
+from brrp_cli.reconstruction import OccupancyPosterior, Surface
+from brrp_cli.results.write import FRAME, POSTERIOR, RECORD, SCHEMA, mesh_name
+
+if TYPE_CHECKING:
+    import trimesh
+
+INSIDE_DEMO = "result"
+AGAIN = "run `brrp reconstruct` again"
+
+
+@dataclass(frozen=True)
+class StoredResult:
+    """What `write_results` wrote. record : the content of result.json.
+
+    Meshes, points and the plane are given in the frame of the meshes (`record["frame"]`), metres;
+    the posteriors and `frame` know the camera frame only.
+    """
+
+    folder: Path
+    record: dict[str, Any]
+
+    @cached_property
+    def T_frame_cam(self) -> NDArray[np.float64]:
+        """(4, 4), from the camera frame to the frame of the meshes."""
+        return np.asarray(self.record["T_frame_cam"], dtype=np.float64)
+
+    @property
+    def object_ids(self) -> list[int]:
+        """Ids of all objects of the frame, with a mesh or without."""
+        return [item["id"] for item in self.record["objects"]]
+
+    @cached_property
+    def surfaces(self) -> dict[int, Surface]:
+        """Meshes by object id, in the frame of the meshes. Errors: ResultError."""
+        return {
+            item["id"]: self._surface(item["mesh"], item["uncertainty_unit"])
+            for item in self.record["objects"]
+            if item["mesh"] is not None
+        }
+
+    @cached_property
+    def frame(self) -> Frame:
+        """The frame that was reconstructed. Errors: FrameError."""
+        return load_frame(self.folder / FRAME)
+
+    @cached_property
+    def posteriors(self) -> dict[int, OccupancyPosterior]:
+        """Posteriors by object id. Errors: BrrpError."""
+        from brrp_cli.results.posterior_file import open_posterior
+
+        return open_posterior(self.folder / POSTERIOR)
+
+    @property
+    def plane_cam(self) -> Plane | None:
+        """The support plane in the camera frame."""
+        stored = self.record["plane_cam"]
+        return None if stored is None else Plane(np.asarray(stored["normal"]), stored["offset"])
+
+    @property
+    def plane(self) -> Plane | None:
+        """The support plane in the frame of the meshes."""
+        plane = self.plane_cam
+        if plane is None:
+            return None
+        on_plane = transform_points(self.T_frame_cam, -plane.offset * plane.normal)
+        normal = self.T_frame_cam[:3, :3] @ plane.normal
+        return Plane(normal, float(-normal @ on_plane))
+
+    @property
+    def surface_config(self) -> SurfaceConfig:
+        """How the meshes were made."""
+        return SurfaceConfig(**self.record["config"]["surface"])
+
+    def _surface(self, name: str, unit: str) -> Surface:
+        mesh = _read_mesh(self.folder / name)
+        values = mesh.metadata["_ply_raw"]["vertex"]["data"]["uncertainty"]
+        return Surface(
+            np.asarray(mesh.vertices, dtype=np.float64),
+            np.asarray(mesh.faces, dtype=np.int64),
+            np.asarray(values, dtype=np.float32).reshape(-1),
+            unit,
+        )
+
+
+def open_result(folder: str | Path) -> StoredResult:
+    """The results in a folder that `brrp reconstruct` wrote, or in one of `brrp demo`.
+
+    Errors: ResultError if there are none, or if they are of another schema.
+    """
+    folder = Path(folder)
+    if not (folder / RECORD).is_file() and (folder / INSIDE_DEMO / RECORD).is_file():
+        folder = folder / INSIDE_DEMO
+    path = folder / RECORD
+    try:
+        record = parse_json(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise ResultError(
+            "There are no results that can be read",
+            where=folder,
+            expected=f"a folder that `brrp reconstruct` wrote, with {RECORD} in it",
+            found=error.strerror if isinstance(error, OSError) else error,
+            fix="give the folder that `brrp reconstruct` named in its last line",
+        ) from error
+    if not isinstance(record, dict) or record.get("schema") != SCHEMA:
+        found = record.get("schema") if isinstance(record, dict) else type(record).__name__
+        raise ResultError(
+            "The results have another schema", where=path, expected=SCHEMA, found=found, fix=AGAIN
+        )
+    if not (folder / FRAME).is_file():
+        raise ResultError(
+            "The results lack the frame that they are of", where=folder, expected=FRAME, fix=AGAIN
+        )
+    try:
+        _check(record)
+    except (AttributeError, KeyError, TypeError, ValueError) as error:
+        raise ResultError(
+            "The record of the results is damaged",
+            where=path,
+            expected="what `brrp reconstruct` wrote",
+            found=f"{type(error).__name__}: {error}",
+            fix=AGAIN,
+        ) from error
+    return StoredResult(folder, record)
+
+
+def _check(record: dict[str, Any]) -> None:
+    """Whether everything that is read of a record is there.
+
+    Errors: AttributeError, KeyError, TypeError, ValueError.
+    """
+    T = _numbers(record["T_frame_cam"], (4, 4))
+    if not np.allclose(T[:3, :3] @ T[:3, :3].T, np.eye(3), atol=1e-3):
+        raise ValueError("T_frame_cam is no rigid transform")
+    if record["frame"] not in ("camera", "world"):
+        raise ValueError(f"frame {record['frame']!r}")
+    for key in ("method", "brrp"):
+        _text(record[key])
+    for key in ("retriever", "seed"):
+        record[key]
+    plane = record["plane_cam"]
+    if plane is not None:
+        if abs(np.linalg.norm(_numbers(plane["normal"], (3,))) - 1) > 1e-3:
+            raise ValueError("the plane's normal is no unit vector")
+        _numbers(plane["offset"], ())
+    for name, value in record["config"]["surface"].items():
+        if not _numbers(value, ()) > 0:
+            raise ValueError(f"surface {name} {value!r:.60}")
+    SurfaceConfig(**record["config"]["surface"])
+    ids = [item["id"] for item in record["objects"]]
+    if not all(type(i) is int for i in ids) or len(set(ids)) < len(ids):
+        raise ValueError(f"ids {ids[:10]}")
+    for item in record["objects"]:
+        _text(item["status"])
+        _text(item["message"])
+        if item["mesh"] is not None:
+            # A name of another's making could lead out of the folder.
+            if item["mesh"] != mesh_name(item["id"]):
+                raise ValueError(f"mesh {item['mesh']!r}")
+            _text(item["uncertainty_unit"])
+
+
+def _numbers(value: Any, shape: tuple[int, ...]) -> NDArray[np.float64]:
+    array = np.asarray(value, dtype=np.float64)
+    if array.shape != shape or not np.isfinite(array).all():
+        raise ValueError(f"{value!r:.60} is not {shape} finite numbers")
+    return array
+
+
+def _text(value: Any) -> None:
+    if not isinstance(value, str):
+        raise TypeError(f"{value!r:.60} is no text")
+
+
+def _read_mesh(path: Path) -> trimesh.Trimesh:
+    import trimesh
+
+    try:
+        mesh = trimesh.load_mesh(path, process=False)
+        mesh.metadata["_ply_raw"]["vertex"]["data"]["uncertainty"]
+    except (OSError, KeyError, ValueError, IndexError) as error:
+        raise ResultError(
+            "A mesh of the results cannot be read",
+            where=path,
+            expected="a PLY with the scalar `uncertainty` on its vertices, as brrp writes it",
+            found=error,
+            fix=AGAIN,
+        ) from error
+    return mesh

@@ -1,0 +1,1 @@
+"""CLIP: P(c|R) from the crop of an object and the stored phrases."""

@@ -1,0 +1,90 @@
+"""How alike a seen object is to stored ones: colours, shape, size. Matrix products throughout."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brrp_cli.descriptors.colour_histogram import colour_histograms
+from brrp_cli.descriptors.descriptor import roots
+from brrp_cli.retrieval.observed_appearance import SeenObject
+from brrp_cli.retrieval.score_fusion import NEUTRAL_COLOUR, NEUTRAL_PAIRS, Similarity
+
+# Sizes differ by this much without meaning anything: metres for height and both sides of the
+# footprint, and a share of the stored one.
+SIZE_SPREAD = np.array([0.006, 0.008, 0.008], dtype=np.float32)
+SIZE_SHARE = np.float32(0.06)
+# Being smaller than the stored object, against being larger: a footprint is seen from one side.
+SMALLER = np.array([1.0, 0.15, 0.15], dtype=np.float32)
+# Squared spreads beyond which nothing more speaks against a size.
+SIZE_LIMIT = np.float32(16.0)
+
+
+def colour_likeness(
+    histograms: NDArray[np.floating] | None, stored: NDArray[np.uint8], lights: int
+) -> NDArray[np.float32]:
+    """Bhattacharyya coefficient (g, m) of the most similar view, for histograms (g, b) of what is
+    seen in g lights and stored views (m, v, b). Neutral where either has no colours."""
+    count, views, bins = stored.shape
+    if histograms is None:
+        return np.full((lights, count), NEUTRAL_COLOUR, np.float32)
+    seen = np.sqrt(histograms, dtype=np.float32)
+    alike = seen @ roots(stored.reshape(count * views, bins)).T
+    found = np.asarray(alike.reshape(len(seen), count, views).max(axis=-1))
+    found[:, ~stored.any(axis=(1, 2))] = NEUTRAL_COLOUR
+    return found
+
+
+def pair_likeness(
+    histogram: NDArray[np.floating] | None, stored: NDArray[np.uint8]
+) -> NDArray[np.float32]:
+    """The same (m,) for the histogram over point pairs (b,) and stored views (m, v, b)."""
+    if histogram is None:
+        return np.full(len(stored), NEUTRAL_PAIRS, np.float32)
+    alike = roots(stored) @ np.sqrt(histogram, dtype=np.float32)
+    return np.asarray(alike.max(axis=-1))
+
+
+def size_penalty(
+    size: NDArray[np.floating] | None, stored: NDArray[np.float32], hidden: float
+) -> NDArray[np.float32]:
+    """What speaks against the size (m,), 0 or less, in the resting pose that fits best.
+
+    size : (3,) seen height and footprint, metres; stored : (m, r, 3), NaN where there is no pose;
+    hidden : share of the outline that ends at something in front. What is seen can be smaller than
+    the object, the more so the more is hidden, but not larger.
+    """
+    if size is None:
+        return np.zeros(len(stored), np.float32)
+    spread = SIZE_SPREAD + SIZE_SHARE * stored
+    off = (size.astype(np.float32) - stored) / spread
+    larger = np.minimum(np.maximum(off, 0) ** 2, SIZE_LIMIT)
+    smaller = np.minimum(np.maximum(-off, 0) ** 2 * SMALLER, SIZE_LIMIT)
+    against = (larger + np.float32((1 - hidden) ** 2) * smaller).sum(axis=-1)
+    return np.asarray(-np.nanmin(against, axis=-1) / 2, dtype=np.float32)
+
+
+def evidence(
+    seen: SeenObject,
+    histograms: NDArray[np.floating] | None,
+    stored: NDArray[Any],
+    rows: NDArray[np.int64],
+    lights: int,
+) -> Similarity:
+    """All of it for stored descriptors (m,), which are those of the rows (m,) of the prior."""
+    return Similarity(
+        rows=rows,
+        colour=colour_likeness(histograms, stored["colour"], lights),
+        pairs=pair_likeness(seen.pairs, stored["pairs"]),
+        size=size_penalty(seen.size, stored["sizes"], seen.hidden),
+        hidden=seen.hidden,
+    )
+
+
+def lit_histograms(seen: SeenObject, gains: NDArray[np.floating]) -> NDArray[np.float32] | None:
+    """Histograms (g, b) of the seen colours in each light; None without colours."""
+    if seen.colours is None or seen.shares is None:
+        return None
+    return colour_histograms(seen.colours, seen.shares, gains)

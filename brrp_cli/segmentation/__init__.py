@@ -1,0 +1,1 @@
+"""Segmentation: object masks from depth and colour, without a model or by a phrase."""

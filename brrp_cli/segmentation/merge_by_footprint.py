@@ -1,0 +1,171 @@
+"""Parts of the image that stand on one spot of the table: the inside of a mug and its outside."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brrp_cli.segmentation.components import contacts, relabel
+from brrp_cli.segmentation.merge_by_colour import same_hue, vivid_hues
+from brrp_cli.segmentation.table_plane import convex_hull, in_hull
+
+Array = NDArray[np.float64]
+
+_CELL = 0.003
+# Mean cosine to the middle: of an inside that shares the footprint, and of walls of which one is
+# seen from within and one from without (of a round one 0.9).
+_INWARD, _FACING = 0.3, 0.7
+_ROUND = 0.35  # of both footprints, that the hull around them may hold besides
+_ABOVE = 0.02  # metres by which an inside may rise over its outside
+_SAME_RANGE = 0.3
+_STANDS = 0.04  # metres; what is nowhere lower does not stand on the table
+_OVER = 0.4  # of the smaller footprint, shared by what hangs on something and that
+_PIECES = 0.25  # of the smaller footprint, shared by pieces of one thing
+_COLOURED = 0.15  # of the smaller footprint, shared by pieces of one vivid colour
+
+
+@dataclass(frozen=True)
+class Standing:
+    """One part as it stands.
+
+    cells : of the plan, in the hull of its footprint; box : the lowest and highest of them;
+    middle : theirs, metres; plan, normals : (n, 2) its points and their normals in the plan;
+    low, high : heights between which nine tenths of it lie, metres
+    """
+
+    cells: frozenset[tuple[int, int]]
+    box: tuple[NDArray[np.int64], NDArray[np.int64]]
+    middle: Array
+    plan: Array
+    normals: Array
+    low: float
+    high: float
+
+
+def join_on_one_spot(
+    parts: NDArray[np.int64],
+    plan: Array,
+    height: Array,
+    plan_normals: Array,
+    crease: Array,
+    rgb: NDArray[np.uint8],
+    overlap: float,
+) -> NDArray[np.int64]:
+    """Labels (H, W) in which parts that belong together, though something lies between them in the
+    image, have one label.
+
+    Parts that meet in a hollow crease are two things, unless the upper one neither stands on the
+    table nor lies over the lower one: a handle, the body of a drill. Of parts that do not, whose
+    footprints share `overlap` of the smaller one, one may be the inside of the other: it faces the
+    other's middle, as the far wall of a mug does. Or both are pieces of one thing, at one height.
+    Parts of one vivid colour that share some of their footprints are one thing however they meet:
+    the studs of a brick.
+
+    plan : (H, W, 2) plan coordinates, height : (H, W) above the table, metres; plan_normals :
+    (H, W, 2) the normals' part in the plan; crease : (H, W) hollow creases that are no jumps of
+    depth, 0 to 1; rgb : (H, W, 3)
+    """
+    count = int(parts.max()) + 1
+    standing = {
+        int(i): _standing(parts == i, plan, height, plan_normals)
+        for i in np.unique(parts[parts > 0])
+    }
+    touch = contacts(parts, crease)
+    hues = vivid_hues(parts, rgb)
+    same = np.zeros((count, count), dtype=bool)
+    for i, first in standing.items():
+        for j, second in standing.items():
+            if j >= i:
+                continue
+            if _apart(first, second):
+                continue
+            shared = len(first.cells & second.cells) / min(len(first.cells), len(second.cells))
+            if touch[i, j]:
+                pieces = shared > _OVER and _hangs(first, second)
+            else:
+                pieces = shared > _PIECES and _at_one_height(first, second)
+            inward = max(_inward(first, second), _inward(second, first))
+            inside = inward > _INWARD and shared > overlap
+            coloured = shared > _COLOURED and same_hue(hues[i], hues[j])
+            walls = _walls(first, second) or _walls(second, first)
+            same[i, j] = pieces or inside or coloured or walls
+    return relabel(parts, same)
+
+
+def _standing(mask: NDArray[np.bool_], plan: Array, height: Array, normals: Array) -> Standing:
+    cells = _filled(np.unique(np.floor(plan[mask] / _CELL).astype(np.int64), axis=0))
+    bottom, top = np.percentile(height[mask], (5, 95))
+    known = mask & np.isfinite(normals).all(axis=-1)
+    return Standing(
+        cells=frozenset((int(a), int(b)) for a, b in cells),
+        box=(cells.min(axis=0), cells.max(axis=0)),
+        middle=(cells.mean(axis=0) + 0.5) * _CELL,
+        plan=plan[known],
+        normals=normals[known],
+        low=float(bottom),
+        high=float(top),
+    )
+
+
+def _filled(cells: NDArray[np.int64]) -> NDArray[np.int64]:
+    """All cells (m, 2) in the convex hull of cells (n, 2)."""
+    hull = convex_hull(cells.astype(np.float64))
+    if hull is None:
+        return cells
+    low, high = cells.min(axis=0), cells.max(axis=0)
+    box = np.stack(
+        np.meshgrid(*(np.arange(a, b + 1) for a, b in zip(low, high, strict=True))), axis=-1
+    ).reshape(-1, 2)
+    return box[in_hull(hull, box.astype(np.float64), 1e-9)]
+
+
+def _apart(first: Standing, second: Standing) -> bool:
+    """Whether table lies between two footprints, as their bounding boxes tell."""
+    return bool(
+        (first.box[0] > second.box[1] + 2).any() or (second.box[0] > first.box[1] + 2).any()
+    )
+
+
+def _gap(first: Standing, second: Standing) -> float:
+    """What the hull of both footprints holds beside them, as a part of them."""
+    both = np.array(sorted(first.cells | second.cells), dtype=np.int64)
+    return len(_filled(both)) / len(both) - 1.0
+
+
+def _inward(inner: Standing, outer: Standing) -> float:
+    """How much the steep surface of `inner` faces the middle of both: 1 all of it, -1 away. 0 where
+    it rises above `outer`."""
+    if inner.high > outer.high + _ABOVE:
+        return 0.0
+    both = np.array(sorted(inner.cells | outer.cells), dtype=np.float64)
+    toward = (both.mean(axis=0) + 0.5) * _CELL - inner.plan
+    length = np.linalg.norm(toward, axis=-1, keepdims=True)
+    facing = np.sum(toward * inner.normals, axis=-1) / np.maximum(length[:, 0], 1e-9)
+    # A floor faces neither way, and counts neither way.
+    steepness = np.linalg.norm(inner.normals, axis=-1).sum()
+    return float(facing.sum() / max(steepness, 1e-9))
+
+
+def _walls(far: Standing, near: Standing) -> bool:
+    """Whether two are the far wall of a round thing, seen from within, and its near wall, seen from
+    without: of one height, one facing the middle and one away, and round together."""
+    return (
+        abs(far.high - near.high) < _ABOVE
+        and _inward(far, near) > _FACING
+        and _inward(near, far) < -_FACING
+        and _gap(far, near) < _ROUND
+    )
+
+
+def _hangs(first: Standing, second: Standing) -> bool:
+    """Whether the upper of two that touch neither stands on the table nor lies on the lower."""
+    lower, upper = (first, second) if first.low < second.low else (second, first)
+    middle = tuple(int(c) for c in np.floor(upper.middle / _CELL))
+    return upper.low > _STANDS and middle not in lower.cells
+
+
+def _at_one_height(first: Standing, second: Standing) -> bool:
+    shared = min(first.high, second.high) - max(first.low, second.low)
+    return shared > _SAME_RANGE * min(first.high - first.low, second.high - second.low)

@@ -1,0 +1,136 @@
+"""Object masks without a model: what stands on the table, apart in depth.
+
+Depth is smoothed and freed of flying pixels. What rises above the table is cut at jumps of depth
+and at hollow creases, which is how things that touch meet; parts of which one is the inside of the
+other (a mug's walls), or that are of one vivid colour on one spot, are joined again.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brrp_cli.dependencies import import_library
+from brrp_cli.errors import FrameError
+from brrp_cli.frames.frame import BACKGROUND, Frame
+from brrp_cli.geometry import backproject
+from brrp_cli.segmentation.components import absorb_small, find_parts, join_parts
+from brrp_cli.segmentation.concave_edges import depth_jumps, hollow_creases, surface_normals
+from brrp_cli.segmentation.fill_concavities import fill_inside
+from brrp_cli.segmentation.merge_by_footprint import join_on_one_spot
+from brrp_cli.segmentation.region_growing import fill_holes, grow
+from brrp_cli.segmentation.smooth_depth import flying_pixels, smooth_depth
+from brrp_cli.segmentation.table_plane import find_table
+
+
+@dataclass(frozen=True)
+class SegmentConfig:
+    """Lengths are metres.
+
+    min_height, max_height : what rises less above the table is the table. Between the two it is
+        `sigmas` deviations of the table's own height, which grow with the square of the distance
+    rim : pixels that rise that part of it join an object within `reach`
+    border : parts are joined where their common border is less of a boundary than that (0 to 1)
+    overlap : parts whose footprints share that part of the smaller one may be one object
+    margin : how far beside the seen table an object may stand
+    min_area : objects that show less of themselves are dropped, metres squared
+    """
+
+    min_height: float = 0.004
+    max_height: float = 0.015
+    sigmas: float = 3.5
+    rim: float = 0.7
+    reach: float = 0.008
+    border: float = 0.45
+    overlap: float = 0.3
+    margin: float = 0.03
+    min_area: float = 0.0007
+
+
+def segment(frame: Frame, seed: int = 0, config: SegmentConfig | None = None) -> NDArray[np.int64]:
+    """Masks (H, W) of the objects that stand on the table: 1, 2, ... from left to right.
+
+    The frame's own masks are not looked at; background, also behind the table, is 0, and so are
+    pixels without depth but for small holes inside an object.
+
+    Errors: FrameError if there is no table or nothing stands on it.
+    """
+    ndimage = import_library("scipy.ndimage")
+    config = config or SegmentConfig()
+    raw = np.where(frame.valid, frame.points[..., 2], np.nan)
+    depth = smooth_depth(np.where(flying_pixels(raw), np.nan, raw))
+    points = backproject(depth, frame.K).astype(np.float64)
+    valid = np.isfinite(depth)
+    table = find_table(points[valid], seed, frame.source)
+    height = table.plane.signed_distance(points)
+    plan = table.plan(points)
+    lift = _lift(height, depth, config)
+    with np.errstate(invalid="ignore"):
+        on_table = np.zeros(frame.shape, dtype=bool)
+        on_table[valid] = table.holds(plan[valid], config.margin)
+        risen = on_table & (height > lift)
+        rim = on_table & (height > config.rim * lift)
+        floor = on_table & (height > -config.max_height)
+    normals = surface_normals(points)
+    crease = hollow_creases(points, normals)
+    jumps = depth_jumps(depth, frame.K)
+    boundary = np.maximum(crease, jumps)
+    # Across a jump nothing meets, however the surfaces on both sides lie.
+    meets = np.where(ndimage.binary_dilation(jumps, iterations=2), 0.0, crease)
+    parts = find_parts(risen, boundary)
+    parts = join_parts(parts, boundary, config.border)
+    parts = join_on_one_spot(
+        parts, plan, height, table.plan(normals), meets, frame.rgb, config.overlap
+    )
+    small = _areas(parts, frame) < config.min_area
+    segmap = absorb_small(parts, boundary, small)
+    # Pixels at edges, which were left out of the smoothed depth, join what they lie next to.
+    edges = frame.valid & ~valid & (table.plane.signed_distance(frame.points) > config.rim * lift)
+    points = np.where(edges[..., None], frame.points, points)
+    segmap = grow(segmap, points, rim | edges, config.reach)
+    segmap = fill_inside(segmap, table.plan(points), floor)
+    segmap = fill_holes(segmap, ~frame.valid)
+    return _numbered(segmap, frame, config.min_area)
+
+
+def _lift(
+    height: NDArray[np.float64], depth: NDArray[np.float64], config: SegmentConfig
+) -> NDArray[np.float64]:
+    """(H, W) metres above which something has risen from the table at its depth (H, W)."""
+    flat = np.abs(height) < config.max_height
+    scaled = height[flat] / depth[flat] ** 2
+    # The median of deviations, times what makes it the deviation of a normal distribution.
+    deviation = 1.4826 * float(np.median(np.abs(scaled - np.median(scaled)))) if flat.any() else 0.0
+    depth = np.nan_to_num(depth, nan=float(np.nanmedian(depth)))
+    return np.clip(config.sigmas * deviation * depth**2, config.min_height, config.max_height)
+
+
+def _areas(segmap: NDArray[np.int64], frame: Frame) -> NDArray[np.float64]:
+    """(n + 1,) what each label shows of itself, metres squared, as if seen face on."""
+    area = np.nan_to_num(frame.points[..., 2] ** 2) / (frame.K[0, 0] * frame.K[1, 1])
+    return np.asarray(np.bincount(segmap.ravel(), weights=area.ravel()), dtype=np.float64)
+
+
+def _numbered(segmap: NDArray[np.int64], frame: Frame, min_area: float) -> NDArray[np.int64]:
+    """The masks without small ones, numbered by the column of their middle."""
+    areas = _areas(segmap, frame)
+    columns = np.broadcast_to(np.arange(frame.shape[1]), frame.shape)
+    middles = {
+        int(i): float(columns[segmap == i].mean())
+        for i in np.flatnonzero(areas >= min_area)
+        if i != BACKGROUND
+    }
+    if not middles:
+        raise FrameError(
+            "Nothing stands on the table",
+            where=frame.source,
+            expected="objects that rise above their support plane",
+            found=f"none that shows {min_area * 1e4:g} cm^2 of itself",
+            fix="move the camera nearer, or pass masks with --masks",
+        )
+    numbered = np.zeros_like(segmap)
+    for number, old in enumerate(sorted(middles, key=lambda i: middles[i]), start=1):
+        numbered[segmap == old] = number
+    return numbered

@@ -1,0 +1,132 @@
+"""The table of a frame without masks: which plane supports the objects, and how far it reaches."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brrp_cli.dependencies import import_library
+from brrp_cli.errors import FrameError
+from brrp_cli.observation.support_plane import Plane, largest_plane
+from brrp_cli.seeds import child_rng, child_seed
+
+_DRAWN = 40_000
+_TOLERANCE = 0.01
+_CANDIDATES = 3
+_PARALLEL = np.cos(np.radians(10))
+_TABLE_HEIGHT = 0.2
+_CELL = 0.02
+
+
+@dataclass(frozen=True)
+class Table:
+    """A support plane with its extent.
+
+    plane : the objects' side, which is the camera's, is positive
+    axes : (2, 3) float64, unit, spanning the plane: plan coordinates are points @ axes.T
+    hull : (m, 3) float64: plan points p with hull[:, :2] @ p + hull[:, 2] <= 0 lie on the table
+    """
+
+    plane: Plane
+    axes: NDArray[np.float64]
+    hull: NDArray[np.float64]
+
+    def plan(self, points: NDArray[np.floating]) -> NDArray[np.float64]:
+        """Plan coordinates (..., 2), metres, of points (..., 3), camera frame."""
+        return np.asarray(points @ self.axes.T, dtype=np.float64)
+
+    def holds(self, plan: NDArray[np.float64], margin: float) -> NDArray[np.bool_]:
+        """(n,) whether plan points (n, 2) lie on the table or at most `margin` beside it."""
+        return in_hull(self.hull, plan, margin)
+
+
+def in_hull(
+    hull: NDArray[np.float64], plan: NDArray[np.float64], margin: float
+) -> NDArray[np.bool_]:
+    """(n,) whether plan points (n, 2) lie in a hull (m, 3) grown by `margin`."""
+    return np.asarray((plan @ hull[:, :2].T + hull[:, 2] <= margin).all(axis=-1))
+
+
+def convex_hull(plan: NDArray[np.float64]) -> NDArray[np.float64] | None:
+    """Half planes (m, 3) of the convex hull of plan points (n, 2); None if it has no area."""
+    spatial = import_library("scipy.spatial")
+    try:
+        return np.asarray(spatial.ConvexHull(plan).equations, dtype=np.float64)
+    except (spatial.QhullError, ValueError):
+        return None
+
+
+def find_table(points: NDArray[np.floating], seed: int, source: object = None) -> Table:
+    """The support plane of points (n, 3), metres, camera frame.
+
+    The planes with most points are found one after the other (RANSAC). The table is the largest,
+    or, where a floor is larger, a plane that lies well above it, is parallel to it and has a
+    quarter of its points.
+
+    Errors: FrameError if no plane holds a twentieth of the points.
+    """
+    if len(points) > _DRAWN:
+        points = points[child_rng(seed, "table").choice(len(points), _DRAWN, replace=False)]
+    planes = _largest_planes(points.astype(np.float64), seed)
+    if not planes:
+        raise FrameError(
+            "No support plane was found",
+            where=source,
+            expected="a table that fills a good part of the image",
+            found="no plane with a twentieth of the points",
+            fix="take the picture so that more of the table is seen, or pass masks with --masks",
+        )
+    plane = _above_the_floor(planes)
+    axes = np.linalg.svd(plane.normal[None])[2][1:]
+    on = (points @ axes.T)[np.abs(plane.signed_distance(points)) < _TOLERANCE]
+    hull = convex_hull(_largest_patch(on))
+    if hull is None:
+        raise FrameError("The support plane has no extent", where=source)
+    return Table(plane=plane, axes=axes, hull=hull)
+
+
+def _largest_planes(points: NDArray[np.float64], seed: int) -> list[tuple[Plane, int]]:
+    """Planes with at least a twentieth of the points, most points first, camera side positive."""
+    planes: list[tuple[Plane, int]] = []
+    rest = points
+    for index in range(_CANDIDATES):
+        if len(rest) < len(points) / 20:
+            break
+        model = largest_plane(rest, _TOLERANCE, 1000, child_seed(seed, "table", index))
+        if model is None:
+            break
+        model = model if model[3] > 0 else -model
+        plane = Plane(model[:3], float(model[3]))
+        inlier = np.abs(plane.signed_distance(rest)) < _TOLERANCE
+        if inlier.sum() < len(points) / 20:
+            break
+        planes.append((plane, int(inlier.sum())))
+        rest = rest[~inlier]
+    return sorted(planes, key=lambda pair: -pair[1])
+
+
+def _above_the_floor(planes: list[tuple[Plane, int]]) -> Plane:
+    largest, size = planes[0]
+    table = largest
+    for plane, count in planes[1:]:
+        parallel = plane.normal @ largest.normal > _PARALLEL
+        # Offsets are the camera's heights above the planes. What rises less than a table's legs
+        # are long is the tops of things on the table.
+        if parallel and count >= size / 4 and table.offset - plane.offset > _TABLE_HEIGHT:
+            table = plane
+    return table
+
+
+def _largest_patch(plan: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Those of the plan points (n, 2) that hang together: a floor beyond the edge is no table."""
+    ndimage = import_library("scipy.ndimage")
+    cells = np.floor(plan / _CELL).astype(np.int64)
+    cells -= cells.min(axis=0)
+    grid = np.zeros(cells.max(axis=0) + 1, dtype=bool)
+    grid[tuple(cells.T)] = True
+    # Objects hide parts of the table behind them: patches up to 8 cm apart are one.
+    joined, _ = ndimage.label(ndimage.binary_dilation(grid, iterations=2))
+    patch = joined[tuple(cells.T)]
+    return plan[patch == np.bincount(patch).argmax()]

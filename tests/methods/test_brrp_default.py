@@ -1,0 +1,178 @@
+"""The default preset from a built prior and a cast frame to shapes whose truth is known."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import trimesh
+from older_prior import older_prior
+from table_scene import box, in_camera, photograph, placed
+
+from brrp_cli import open_posterior, open_prior, reconstruct, write_results
+from brrp_cli.config import preset
+from brrp_cli.errors import PriorError
+from brrp_cli.geometry import transform_points
+from brrp_cli.prior.build.build import build_prior
+from brrp_cli.prior.parameters import BuildParameters
+from brrp_cli.prior.store import verify_prior
+from brrp_cli.raycast import inside
+from brrp_cli.reconstruction import NO_SURFACE, OK
+from brrp_cli.retrieval.given import TruthRetriever
+from brrp_cli.shapes import solids
+
+BOX, CAN, STRANGE = 9, 4, 6
+CONFIG = preset("default")
+
+
+def can() -> trimesh.Trimesh:
+    return solids.cylinder(0.04, 0.12)
+
+
+def iou(surface, mesh):
+    """Of a reconstructed surface with the true mesh, both in the camera frame."""
+    low, high = mesh.bounds[0] - 0.04, mesh.bounds[1] + 0.04
+    points = np.random.default_rng(0).uniform(low, high, (20_000, 3))
+    found, true = inside(surface.as_trimesh(), points), inside(mesh, points)
+    return (found & true).sum() / (found | true).sum()
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """A prior of the box and the can, as `brrp build-prior` makes it."""
+    meshes = tmp_path_factory.mktemp("meshes")
+    box().export(meshes / "box.ply")
+    can().export(meshes / "can.ply")
+    out = tmp_path_factory.mktemp("prior") / "prior"
+    build_prior(meshes, out, BuildParameters(samples=1000, dense_points=5000), workers=1)
+    return out
+
+
+@pytest.fixture(scope="module")
+def truth():
+    """True meshes by id, camera frame."""
+    return {
+        BOX: in_camera(box(), placed(-0.08, 0.03, 0.7)),
+        CAN: in_camera(can(), placed(0.09, -0.04, 0.0)),
+    }
+
+
+@pytest.fixture(scope="module")
+def result(folder, truth):
+    return reconstruct(photograph(truth), open_prior(folder), workers=2)
+
+
+@pytest.mark.parametrize("object_id", [BOX, CAN])
+def test_stored_objects_are_reconstructed_as_they_are(result, truth, object_id):
+    item = next(o for o in result.objects if o.object_id == object_id)
+    assert item.status == OK and item.surface.as_trimesh().is_watertight
+    assert iou(item.surface, truth[object_id]) > 0.85
+
+
+def test_the_record_tells_of_evidence_and_weights(result):
+    for item, name in zip(result.objects, ("can", "box"), strict=True):
+        assert item.retrieved[0].name == name
+        assert item.retrieved[0].alignment_score > CONFIG.hypotheses.weigh.unknown_score
+        assert item.retrieved[0].weight > 0.9
+        assert item.retrieved[1].alignment_score < item.retrieved[0].alignment_score
+        weights = [r.weight for r in item.retrieved]
+        assert sum(weights) + item.unknown_weight == pytest.approx(1)
+        probabilities = [r.probability for r in item.retrieved]
+        assert sum(probabilities) + item.unknown_probability == pytest.approx(1)
+
+
+def test_the_best_placement_is_the_true_one(result, truth, folder):
+    """Points of the stored surface lie on the true one: a can may be turned, a box by halves."""
+    stored = open_prior(folder).load("can")
+    item = result.objects[0]
+    surface = transform_points(item.retrieved[0].T_cam_object, stored.surface.astype(np.float64))
+    true = placed(0.09, -0.04, 0.0)
+    local = transform_points(np.linalg.inv(true), surface)
+    radius, height = np.hypot(*local[:, :2].T), local[:, 2]
+    assert radius.max() < 0.045 and height.min() > -0.005 and height.max() < 0.125
+    assert item.retrieved[0].scale == 1.0
+
+
+def test_surface_uncertainty_is_in_metres_and_larger_where_nobody_looked(result, truth):
+    item = next(o for o in result.objects if o.object_id == CAN)
+    mesh = item.surface.as_trimesh()
+    towards = np.einsum("ij,ij->i", mesh.vertex_normals, -mesh.vertices) > 0
+    assert 0.0005 < np.median(item.surface.uncertainty) < 0.02
+    assert item.surface.uncertainty[~towards].mean() > item.surface.uncertainty[towards].mean()
+
+
+def test_the_same_seed_gives_the_same_bytes(result, folder, truth):
+    again = reconstruct(photograph(truth), open_prior(folder), workers=2)
+    for a, b in zip(result.objects, again.objects, strict=True):
+        assert a.surface.vertices.tobytes() == b.surface.vertices.tobytes()
+        assert a.surface.uncertainty.tobytes() == b.surface.uncertainty.tobytes()
+
+
+def test_an_object_that_the_prior_does_not_hold_gets_the_shape_of_what_was_seen(folder):
+    """A lying bar, of a shape that nothing stored comes near."""
+    strange = in_camera(solids.box(0.20, 0.05, 0.05), placed(0.0, 0.0, 1.3))
+    found = reconstruct(photograph({STRANGE: strange}), open_prior(folder)).objects[0]
+    assert found.unknown_weight > 0.5
+    assert iou(found.surface, strange) > 0.6
+
+
+def test_retrieval_that_is_wrong_is_outweighed_by_what_the_frame_says(folder, truth):
+    prior = open_prior(folder)
+    wrong = TruthRetriever(prior.names, {CAN: "box"})
+    found = reconstruct(photograph({CAN: truth[CAN]}), prior, retriever=wrong).objects[0]
+    weights = {r.name: r.weight for r in found.retrieved}
+    assert [r.name for r in found.retrieved] == ["box", "can"]
+    assert weights["can"] > 0.9
+    assert iou(found.surface, truth[CAN]) > 0.85
+
+
+def test_a_map_that_is_nowhere_sure_enough_has_no_surface_but_files(folder, truth, tmp_path):
+    config = replace(CONFIG, surface=replace(CONFIG.surface, level=0.99999))
+    result = reconstruct(photograph({CAN: truth[CAN]}), open_prior(folder), config=config)
+    assert result.objects[0].status == NO_SURFACE
+    names = {path.name for path in write_results(result, tmp_path / "out")}
+    assert names == {"frame.npz", "posterior.h5", "result.json", "preview.png"}
+    assert list(open_posterior(tmp_path / "out" / "posterior.h5")) == [CAN]
+
+
+def test_without_a_table_in_sight_there_is_a_result_too(folder, truth):
+    frame = photograph({CAN: truth[CAN]}, table=False)
+    found = reconstruct(frame, open_prior(folder))
+    assert found.plane is None
+    assert iou(found.objects[0].surface, truth[CAN]) > 0.7
+
+
+def test_a_prior_without_distances_is_refused_before_the_work(folder, truth, tmp_path):
+    older = open_prior(older_prior(folder, tmp_path / "older"))
+    assert verify_prior(older) == []
+    assert older.load("can").distances is None
+    with pytest.raises(PriorError, match="no distances") as caught:
+        reconstruct(photograph(truth), older)
+    assert "--overwrite" in str(caught.value) and "--preset paper" in str(caught.value)
+
+
+def test_a_prior_without_distances_serves_the_paper(folder, truth, tmp_path):
+    older = open_prior(older_prior(folder, tmp_path / "older"))
+    paper = preset("paper")
+    quick = replace(
+        paper,
+        k=1,
+        registration=replace(paper.registration, iterations=2000),
+        inference=replace(paper.inference, epochs=1, particles=2),
+    )
+    found = reconstruct(
+        photograph({CAN: truth[CAN]}),
+        older,
+        config=quick,
+        retriever=TruthRetriever(older.names, {CAN: "can"}),
+    )
+    assert found.objects[0].status in (OK, NO_SURFACE)
+    assert found.objects[0].retrieved[0].name == "can"
+
+
+def test_the_number_of_threads_changes_no_byte(folder, truth, result):
+    again = reconstruct(photograph(truth), open_prior(folder), workers=1)
+    for one, other in zip(result.objects, again.objects, strict=True):
+        assert one.surface.vertices.tobytes() == other.surface.vertices.tobytes()
+        assert one.surface.uncertainty.tobytes() == other.surface.uncertainty.tobytes()

@@ -1,0 +1,178 @@
+"""The search finds solids where they stand, in depth without noise."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from table_scene import MESHES, PARAMETERS, TABLE, in_camera, photograph, placed, stored
+
+from brrp_cli.config import SearchConfig
+from brrp_cli.geometry import similarity, transform_points
+from brrp_cli.registration import verification as verifier
+from brrp_cli.registration.model import search_model
+from brrp_cli.registration.pose_search import search
+from brrp_cli.registration.scale_scan import observed_cloud
+
+ID = 5
+CONFIG = SearchConfig()
+
+
+def find(name, T_cam_mesh, *, size=1.0, plane=TABLE, seed=0, config=CONFIG, best=-np.inf):
+    """Hypotheses about an object of that many times the stored size, seen from the front."""
+    mesh = MESHES[name]()
+    mesh.apply_scale(size)
+    frame = photograph({ID: in_camera(mesh, T_cam_mesh)}, table=plane is not None)
+    points = np.random.default_rng(0).permutation(frame.object_points(ID)).astype(np.float64)
+    return search(
+        search_model(stored(name)),
+        observed_cloud(points, PARAMETERS.features),
+        verifier.Verifier(points, frame, plane),
+        PARAMETERS.features,
+        config,
+        seed,
+        best,
+    )
+
+
+def errors(hypothesis, T_cam_mesh, size=1.0):
+    """How far (n,), metres, the placed surface's points are from where they truly are."""
+    model = hypothesis.model
+    true = transform_points(T_cam_mesh, (model.surface + model.stored.center) * size)
+    return np.linalg.norm(transform_points(hypothesis.T_cam_model, model.surface) - true, axis=1)
+
+
+@pytest.mark.parametrize("yaw", [0.0, 2.5])
+def test_an_ell_is_found_where_it_stands_at_its_own_size(yaw):
+    truth = placed(0.02, -0.03, yaw)
+    found = find("ell", truth)
+    assert errors(found[0], truth).max() < 0.002
+    assert found[0].scale == 1.0
+    assert found[0].alignment_score > 0.8
+    assert 1 <= len(found) <= CONFIG.kept
+    alignment_score = [each.alignment_score for each in found]
+    assert alignment_score == sorted(alignment_score, reverse=True)
+
+
+def test_a_box_is_found_up_to_what_maps_it_to_itself():
+    truth = placed(-0.04, 0.02, 0.6)
+    best = find("box", truth)[0]
+    surface = transform_points(best.T_cam_model, best.model.surface)
+    local = transform_points(np.linalg.inv(truth), surface) - [0, 0, 0.07]
+    # Distance to the surface of the true box, from inside and from outside.
+    beyond = np.abs(local) - [0.05, 0.03, 0.07]
+    assert np.abs(beyond.max(axis=1)).max() < 0.004
+
+
+@pytest.mark.parametrize("size", [0.8, 1.1])
+def test_an_object_of_another_size_is_found_at_that_scale(size):
+    truth = placed(0.0, 0.03, 1.2)
+    best = find("ell", truth, size=size)[0]
+    assert best.scale == size
+    assert np.cbrt(np.linalg.det(best.T_cam_model[:3, :3])) == pytest.approx(size)
+    assert errors(best, truth, size).max() < 0.003
+
+
+def test_no_other_size_is_tried_of_what_lies_well_enough():
+    """An object of 0.8 of its size, when any score is held for enough, and when none is."""
+    truth = placed(0.0, 0.03, 1.2)
+    settled, tried = (
+        find("ell", truth, size=0.8, config=replace(CONFIG, settled=enough))
+        for enough in (-np.inf, np.inf)
+    )
+    assert {each.scale for each in settled} == {1.0}
+    assert tried[0].scale == 0.8 and tried[0].alignment_score > settled[0].alignment_score
+
+
+def test_what_is_hopeless_is_judged_as_it_lies():
+    truth = placed(0.0, 0.03, 1.2)
+    left = find("ell", truth, size=0.8, config=replace(CONFIG, hopeless=np.inf, settled=np.inf))
+    assert left and {each.scale for each in left} == {1.0}
+
+
+def test_what_another_model_has_beaten_is_judged_as_it_lies():
+    truth = placed(0.0, 0.03, 1.2)
+    config = replace(CONFIG, settled=np.inf)
+    close, beaten = (
+        find("ell", truth, size=0.8, config=config, best=best)
+        for best in (CONFIG.beaten, 1 + CONFIG.beaten)
+    )
+    assert {each.scale for each in beaten} == {1.0} and beaten[0].alignment_score < close[
+        0
+    ].alignment_score
+    assert close[0].scale == 0.8
+
+
+def test_without_a_plane_feature_matchings_are_enough():
+    """It stands in the air, and on its head."""
+    over = similarity(rotation=np.diag([1.0, -1.0, -1.0]), translation=np.array([0, 0, 0.1]))
+    truth = placed(0.02, -0.03, 1.2) @ over
+    best = find("ell", truth, plane=None)[0]
+    assert errors(best, truth).max() < 0.002
+
+
+def test_an_object_is_found_whose_one_end_is_hidden():
+    """A long box of which a screen in front lets a third be seen."""
+    truth = placed(0.0, 0.0, 0.1)
+    frame = photograph({ID: in_camera(MESHES["ell"](), truth)})
+    shown = frame.segmap == ID
+    columns = np.flatnonzero(shown.any(axis=0))
+    screen = shown & (np.arange(shown.shape[1]) > columns[0] + len(columns) // 2)
+    points = frame.points.copy()
+    points[screen] *= 0.8
+    segmap = np.where(screen, ID + 1, frame.segmap)
+    frame = replace(frame, points=points, segmap=segmap)
+    seen = np.random.default_rng(0).permutation(frame.object_points(ID)).astype(np.float64)
+    found = search(
+        search_model(stored("ell")),
+        observed_cloud(seen, PARAMETERS.features),
+        verifier.Verifier(seen, frame, TABLE),
+        PARAMETERS.features,
+        CONFIG,
+        0,
+    )
+    assert errors(found[0], truth).max() < 0.003
+
+
+@pytest.mark.parametrize("name", ["box", "ell"])
+def test_hypotheses_differ_in_shape(name):
+    """A box looks the same turned by half a circle: that is one hypothesis."""
+    found = find(name, placed(-0.04, 0.02, 0.6))
+    for i, one in enumerate(found):
+        surface = transform_points(one.T_cam_model, one.model.surface[:300])
+        for other in found[:i]:
+            local = transform_points(np.linalg.inv(other.T_cam_model), surface)
+            assert np.abs(other.model.signed_distance(local)).mean() > CONFIG.distinct
+
+
+def test_the_same_seed_gives_the_same_bytes():
+    truth = placed(0.02, -0.03, 0.9)
+    first, again = (find("ell", truth, seed=4) for _ in range(2))
+    assert [each.T_cam_model.tobytes() for each in first] == [
+        each.T_cam_model.tobytes() for each in again
+    ]
+    assert [each.alignment_score for each in first] == [each.alignment_score for each in again]
+
+
+def test_a_wrong_object_is_less_believed_than_the_right_one():
+    truth = placed(0.02, -0.03, 0.4)
+    frame = photograph({ID: in_camera(MESHES["ell"](), truth)})
+    points = np.random.default_rng(0).permutation(frame.object_points(ID)).astype(np.float64)
+    observed = observed_cloud(points, PARAMETERS.features)
+    seen = verifier.Verifier(points, frame, TABLE)
+    right, wrong = (
+        search(search_model(stored(name)), observed, seen, PARAMETERS.features, CONFIG, 0)[0]
+        for name in ("ell", "box")
+    )
+    assert wrong.alignment_score < right.alignment_score - 0.2
+
+
+def test_the_placement_from_normalised_coordinates_is_the_same_one():
+    truth = placed(0.02, -0.03, 0.9)
+    best = find("ell", truth)[0]
+    placed_surface = transform_points(best.T_cam_model, best.model.surface)
+    normalised = best.model.stored.surface.astype(np.float64)
+    np.testing.assert_allclose(
+        transform_points(best.T_cam_object, normalised), placed_surface, atol=1e-7
+    )

@@ -1,0 +1,129 @@
+"""Many placements slide onto a surface at once, and draws of matches find a known motion."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from brrp_cli.config import RegistrationConfig
+from brrp_cli.geometry import similarity, transform_points
+from brrp_cli.prior.distance_field import DistanceField
+from brrp_cli.prior.objects import PriorObject
+from brrp_cli.registration.batched_ransac import ransac_motions
+from brrp_cli.registration.model import Model
+from brrp_cli.registration.sdf_refinement import refine_to_sdf
+
+HALF = np.array([0.05, 0.03, 0.02])
+
+
+def box_distance(points):
+    """Exact, to a box of half-extents HALF."""
+    off = np.abs(points) - HALF
+    outside = np.linalg.norm(np.maximum(off, 0), axis=-1)
+    return outside + np.minimum(off.max(axis=-1), 0)
+
+
+@pytest.fixture(scope="module")
+def field():
+    low, spacing = -(HALF + 0.03), 0.0025
+    axes = [np.arange(a, -a + spacing, spacing) for a in low]
+    nodes = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
+    return DistanceField(low, spacing, box_distance(nodes).astype(np.float32))
+
+
+@pytest.fixture(scope="module")
+def model(field):
+    nothing = np.zeros((0, 3))
+    stored = PriorObject(
+        "box", "a box", np.zeros(3), 1.0, nothing, nothing, nothing, nothing, {}, [], {},
+        distances=field,
+    )  # fmt: skip
+    return Model(stored, nothing, nothing)
+
+
+@pytest.fixture(scope="module")
+def surface():
+    """Points of three faces of the box, as a camera sees it."""
+    rng = np.random.default_rng(0)
+    points = rng.uniform(-1, 1, (300, 3)) * HALF
+    face = rng.integers(3, size=300)
+    points[np.arange(300), face] = HALF[face]
+    return points
+
+
+def moved(seed, degrees, metres):
+    rng = np.random.default_rng(seed)
+    turn = Rotation.from_rotvec(np.deg2rad(degrees) * rng.standard_normal(3) / np.sqrt(3))
+    return similarity(1.0, turn.as_matrix(), metres * rng.standard_normal(3) / np.sqrt(3))
+
+
+def test_slope_and_distance_are_those_of_the_field(field):
+    points = np.random.default_rng(1).uniform(-0.1, 0.1, (500, 3))
+    distance, slope = field.distance_and_gradient(points.T.astype(np.float32))
+    np.testing.assert_allclose(distance, field.signed_distance(points), atol=1e-6)
+    step = 1e-5
+    for axis, unit in enumerate(np.eye(3)):
+        ahead, back = (field.signed_distance(points + s * step * unit) for s in (1, -1))
+        quotient = (ahead - back) / (2 * step)
+        # But for points whose quotient reaches over a cell's face.
+        assert np.quantile(np.abs(quotient - slope[axis]), 0.97) < 1e-2
+
+
+@pytest.mark.parametrize("scale", [1.0, 1.2])
+def test_placements_slide_onto_the_surface(model, surface, scale):
+    T_cam_true = moved(7, 40, 0.3)
+    T_cam_true[:3, :3] *= scale
+    observed = transform_points(T_cam_true, surface)
+    T_true_cam = np.linalg.inv(T_cam_true)
+    starts = np.stack([moved(seed, 8, 0.008) @ T_true_cam for seed in range(6)])
+    found = refine_to_sdf(starts, observed, model, 0.03, 15)
+    for start, T in zip(starts, found, strict=True):
+        before, after = (np.abs(box_distance(transform_points(t, observed))) for t in (start, T))
+        assert after.mean() < 2e-4 < before.mean()
+        assert np.linalg.det(T[:3, :3]) == pytest.approx(scale**-3)
+
+
+def test_a_placement_that_nothing_pulls_stays(model, surface):
+    far = similarity(translation=np.array([1.0, 0, 0]))
+    found = refine_to_sdf(np.stack([far, np.eye(4)]), surface, model, 0.01, 15)
+    np.testing.assert_array_equal(found[0], far)
+    np.testing.assert_allclose(found[1], np.eye(4), atol=2e-3)
+
+
+CONFIG = RegistrationConfig(iterations=3000)
+
+
+def matches(wrong, seed=0):
+    """60 pairs under a known motion, of which the first `wrong` are mismatched."""
+    rng = np.random.default_rng(seed)
+    source = rng.uniform(-0.08, 0.08, (60, 3))
+    T = moved(3, 100, 0.2)
+    target = transform_points(T, source) + rng.normal(0, 0.0005, source.shape)
+    target[:wrong] = rng.permutation(target[:wrong]) + 0.03
+    return source, target, T
+
+
+def test_draws_find_the_motion_among_wrong_matches():
+    source, target, T = matches(40)
+    found = ransac_motions(source, target, CONFIG, 4, np.random.default_rng(0))
+    assert len(found) == 4
+    for each in found:
+        off = transform_points(each, source[40:]) - transform_points(T, source[40:])
+        assert np.linalg.norm(off, axis=1).max() < CONFIG.correspondence_distance
+        assert np.linalg.det(each[:3, :3]) == pytest.approx(1)
+
+
+def test_matches_that_never_hold_together_give_nothing():
+    rng = np.random.default_rng(0)
+    source, target = rng.uniform(-1, 1, (2, 30, 3))
+    assert ransac_motions(source, 50 * target, CONFIG, 2, rng) == []
+    assert ransac_motions(source[:2], target[:2], CONFIG, 2, rng) == []
+
+
+def test_the_same_seed_draws_the_same():
+    source, target, _ = matches(40)
+    one, two = (
+        ransac_motions(source, target, CONFIG, 2, np.random.default_rng(5)) for _ in range(2)
+    )
+    np.testing.assert_array_equal(one, two)

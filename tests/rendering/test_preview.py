@@ -1,0 +1,62 @@
+"""The picture beside a result."""
+
+import numpy as np
+import pytest
+import trimesh
+
+from brrp_cli.frames.build import make_frame
+from brrp_cli.reconstruction import LOGIT_VARIANCE, METRES, ObjectReconstruction, Retrieved, Surface
+from brrp_cli.rendering.preview import CAPTION, PANEL_WIDTH, _told, preview
+
+K = np.array([[100.0, 0, 80], [0, 100, 60], [0, 0, 1]])
+
+
+def item(retrieved, *, missing=0.0, weight=None, message=""):
+    return ObjectReconstruction(
+        1,
+        "ok",
+        message,
+        retrieved=retrieved,
+        unknown_probability=missing,
+        unknown_weight=weight,
+    )
+
+
+def test_the_list_tells_weights_and_probabilities_largest_first():
+    retrieved = [
+        Retrieved("mug", 0.3, weight=0.9),
+        Retrieved("can", 0.1, weight=0.0),
+        Retrieved("box", 0.001, weight=0.02),
+    ]
+    weights, shares = _told(item(retrieved, missing=0.599, weight=0.08))
+    assert weights == "1: ok; weights mug 0.90, none of them 0.08, box 0.02"
+    assert shares == "none of them 0.60, mug 0.30, can 0.10"
+
+
+def test_without_weights_or_retrieval_the_list_tells_what_there_is():
+    evenly = [Retrieved(name, 0.002) for name in ("a", "b")]
+    assert _told(item(evenly)) == ("1: ok", "a 0.00")
+    assert _told(item([], message="7 valid depth points")) == ("1: ok", "7 valid depth points")
+
+
+@pytest.mark.parametrize("unit", [METRES, LOGIT_VARIANCE])
+def test_the_colour_scale_hides_nothing_of_the_scene(unit):
+    """A table's worth of mesh fills every panel to its edges; no panel shows the scale's paper."""
+    segmap = np.zeros((120, 160), int)
+    segmap[40:80, 60:100] = 1
+    frame = make_frame(
+        np.zeros((120, 160, 3), np.uint8), segmap, depth=np.full((120, 160), 1.0), K=K
+    )
+    mesh = trimesh.creation.box((4.0, 4.0, 0.1))
+    mesh.apply_translation([0, 0, 1.05])
+    surface = Surface(
+        mesh.vertices, mesh.faces, np.full(len(mesh.vertices), 0.004, np.float32), unit
+    )
+    whole = ObjectReconstruction(1, "ok", center=np.array([0, 0, 1.0]), surface=surface)
+    picture = preview(frame, [whole])
+    height = picture.shape[0] // 2
+    unsure = picture[height + CAPTION :, PANEL_WIDTH : 2 * PANEL_WIDTH]
+    # One colour of viridis's top, shaded: no ink, no paper.
+    assert (unsure[..., 2] < unsure[..., 1]).all()
+    caption = picture[height : height + CAPTION, 2 * PANEL_WIDTH :]
+    assert len(np.unique(caption.reshape(-1, 3), axis=0)) > 100

@@ -1,0 +1,63 @@
+import numpy as np
+import pytest
+
+from brrp_cli.retrieval.base import unknown
+from brrp_cli.retrieval.illuminants import lights, local_lights, log_prior
+from brrp_cli.retrieval.score_fusion import Similarity, Weights, believe
+
+WEIGHTS = Weights(colour=20.0, pairs=20.0, size=0.5, offset=8.0)
+FLAT, SAME = np.zeros(2), np.eye(2)
+
+
+def seen(colour, pairs=(1.0, 1.0), size=(0.0, 0.0), hidden=0.0):
+    return Similarity(
+        rows=np.arange(2),
+        colour=np.array(colour, np.float32),
+        pairs=np.array(pairs, np.float32),
+        size=np.array(size, np.float32),
+        hidden=hidden,
+    )
+
+
+def test_one_light_shines_on_all():
+    # Two lights: in the first it is object 0, in the second object 1. The neighbour settles it.
+    torn = seen([[1.0, 0.5], [0.5, 1.0]])
+    alone = believe([torn], FLAT, SAME, 2, WEIGHTS)[0]
+    assert alone[0] == pytest.approx(alone[1])
+    neighbour = seen([[1.0, 0.3], [0.3, 0.3]])
+    together = believe([torn, neighbour], FLAT, SAME, 2, WEIGHTS)[0]
+    assert together[0] > 0.95 and together[0] > 50 * together[1]
+    # Where light differs freely from object to object, the neighbour says nothing.
+    free = believe([torn, neighbour], FLAT, np.full((2, 2), 0.5), 2, WEIGHTS)[0]
+    assert free[0] == pytest.approx(free[1])
+
+
+def test_what_is_like_nothing_is_unknown():
+    alike, strange = seen([[1.0, 0.2]] * 2), seen([[0.3, 0.2]] * 2, pairs=(0.8, 0.7))
+    found = believe([alike, strange], FLAT, SAME, 2, WEIGHTS)
+    assert unknown(found[0]) < 0.01 and unknown(found[1]) > 0.99
+
+
+def test_the_formula_in_plain_numbers():
+    # One light: log odds 8 - 20 * 0.1 - 0.5 * 3 - ln 2 and 8 - 20 * 0.2 * (1 - 0.5) - ln 2.
+    item = seen([[0.9, 1.0]], pairs=(1.0, 0.8), size=(-3.0, 0.0), hidden=0.5)
+    found = believe([item], np.zeros(1), np.eye(1), 2, WEIGHTS)[0]
+    odds = np.exp([8 - 2 - 1.5, 8 - 2.0]) / 2
+    np.testing.assert_allclose(found, odds / (1 + odds.sum()), rtol=1e-5)
+
+
+def test_objects_that_were_not_looked_at_have_no_probability():
+    item = Similarity(
+        np.array([4, 1]), *(np.ones(s, np.float32) for s in ((2, 2), 2)), np.zeros(2), 0
+    )
+    found = believe([item], FLAT, SAME, 6, WEIGHTS)[0]
+    assert (found > 0).tolist() == [False, True, False, False, True, False]
+
+
+def test_lights_are_near_each_other():
+    gains = lights()
+    prior, local = log_prior(gains), local_lights(gains)
+    plain = int(np.abs(np.log(gains)).sum(axis=1).argmin())
+    assert prior[plain] > prior.max() - 0.2
+    np.testing.assert_allclose(local.sum(axis=1), 1)
+    assert local[plain].argmax() == plain

@@ -1,0 +1,82 @@
+import numpy as np
+import pytest
+
+from brrp_cli.descriptors.colour_histogram import COLOUR_BINS
+from brrp_cli.descriptors.descriptor import to_bytes
+from brrp_cli.descriptors.point_pairs import PAIR_BINS
+from brrp_cli.prior.appearance_index import first_look
+from brrp_cli.retrieval.observed_appearance import SeenObject
+from brrp_cli.retrieval.score_fusion import NEUTRAL_COLOUR
+from brrp_cli.retrieval.shortlist import CLOSELY, Shortlist
+from brrp_cli.retrieval.similarity import colour_likeness, pair_likeness, size_penalty
+
+POSES = np.array([[[0.2, 0.1, 0.05], [0.05, 0.2, 0.1]]], np.float32)
+
+
+@pytest.mark.parametrize(
+    ("size", "hidden", "fits"),
+    [
+        ((0.2, 0.1, 0.05), 0.0, True),
+        ((0.05, 0.2, 0.1), 0.0, True),
+        ((0.2, 0.1, 0.02), 0.0, True),  # the far side is not seen
+        ((0.1, 0.1, 0.05), 0.0, False),  # too low
+        ((0.1, 0.1, 0.05), 0.9, True),  # its top may be hidden
+        ((0.3, 0.1, 0.05), 0.9, False),  # larger than the object it never is
+        ((0.2, 0.2, 0.2), 0.0, False),
+    ],
+)
+def test_what_is_seen_may_be_smaller_but_not_larger(size, hidden, fits):
+    penalty = float(size_penalty(np.array(size), POSES, hidden)[0])
+    assert penalty > -1 if fits else penalty < -4
+
+
+def test_missing_poses_and_sizes_say_nothing():
+    padded = np.concatenate([POSES, np.full((1, 3, 3), np.nan, np.float32)], axis=1)
+    size = np.array([0.18, 0.1, 0.05])
+    np.testing.assert_array_equal(size_penalty(size, padded, 0), size_penalty(size, POSES, 0))
+    assert size_penalty(None, POSES, 0).tolist() == [0]
+
+
+def test_the_best_view_counts():
+    rng = np.random.default_rng(0)
+    views = rng.dirichlet(np.full(COLOUR_BINS, 0.05), (3, 4))
+    found = colour_likeness(views[:, 2], to_bytes(views), 3)
+    np.testing.assert_allclose(np.diag(found), 1, atol=0.02)
+    expected = np.einsum("gb,mvb->gmv", np.sqrt(views[:, 2]), np.sqrt(views)).max(axis=-1)
+    np.testing.assert_allclose(found, expected, atol=0.02)
+
+
+def test_objects_without_colours_are_neither_preferred_nor_refused():
+    stored = np.zeros((2, 3, COLOUR_BINS), np.uint8)
+    stored[1, :, 5] = 255
+    seen = np.eye(COLOUR_BINS)[[5, 6]]
+    np.testing.assert_allclose(
+        colour_likeness(seen, stored, 2), [[NEUTRAL_COLOUR, 1], [NEUTRAL_COLOUR, 0]]
+    )
+    np.testing.assert_allclose(colour_likeness(None, stored, 4), NEUTRAL_COLOUR)
+
+
+def test_a_shortlist_of_a_large_prior_holds_the_true_object():
+    rng = np.random.default_rng(3)
+    count, views = 3_000, 4
+    row = np.dtype(
+        [
+            ("colour", "u1", (views, COLOUR_BINS)),
+            ("pairs", "u1", (views, PAIR_BINS)),
+            ("sizes", "f4", (2, 3)),
+        ]
+    )
+    table = np.zeros(count, row)
+    colour = rng.dirichlet(np.full(COLOUR_BINS, 0.02), (count, 1))
+    pairs = rng.dirichlet(np.full(PAIR_BINS, 0.3), (count, 1))
+    table["colour"] = to_bytes(colour * np.ones((views, 1)))
+    table["pairs"] = to_bytes(pairs * np.ones((views, 1)))
+    table["sizes"] = rng.uniform(0.02, 0.3, (count, 2, 3))
+    shortlist = Shortlist(first_look(table))
+    for true in (7, 1234, 2999):
+        size = table["sizes"][true, 0].astype(float)
+        seen = SeenObject(None, None, pairs[true, 0].astype(np.float32), size, 0.0)
+        histograms = np.repeat(colour[true], 9, axis=0).astype(np.float32)
+        rows = shortlist.rows(seen, histograms)
+        assert len(rows) == CLOSELY and true in rows and (np.diff(rows) > 0).all()
+        assert float(pair_likeness(seen.pairs, table["pairs"][[true]])[0]) > 0.98

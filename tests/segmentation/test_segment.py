@@ -1,0 +1,144 @@
+"""Segmentation of a scene whose masks are known."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import trimesh
+from table_scene import T_CAM_WORLD, in_camera, photograph
+
+from brrp_cli.errors import FrameError
+from brrp_cli.frames.build import make_frame
+from brrp_cli.segmentation.fill_concavities import fill_inside
+from brrp_cli.segmentation.merge_by_colour import same_hue, vivid_hues
+from brrp_cli.segmentation.segment import segment
+from brrp_cli.shapes import solids
+
+
+def noisy(depth, seed=0):
+    """Depth as a sensor gives it: noise, millimetres, and smeared edges."""
+    rng = np.random.default_rng(seed)
+    depth = depth + rng.normal(0, 0.0015, depth.shape) * depth**2
+    smeared = depth.copy()
+    smeared[:, 1:-1] = (depth[:, :-2] + 2 * depth[:, 1:-1] + depth[:, 2:]) / 4
+    return (smeared * 1000).round() / 1000
+
+
+def overlap(first, second):
+    """Intersection over union of two masks."""
+    return (first & second).sum() / (first | second).sum()
+
+
+@pytest.mark.parametrize("degrade", [lambda depth: depth, noisy], ids=["clean", "noisy"])
+def test_objects_on_the_table_are_found_from_left_to_right(scene, degrade):
+    depth = degrade(np.where(np.isfinite(scene.depth), scene.depth, 0))
+    found = segment(make_frame(scene.rgb, None, depth=depth, K=scene.K))
+    assert np.unique(found).tolist() == [0, 1, 2, 3]
+    for number, object_id in [(1, 7), (2, 250), (3, -3)]:
+        assert overlap(found == number, scene.segmap == object_id) > 0.7, object_id
+
+
+def test_the_same_seed_gives_the_same_masks(scene):
+    frame = make_frame(scene.rgb, None, depth=scene.depth, K=scene.K)
+    assert np.array_equal(segment(frame, 3), segment(frame, 3))
+
+
+def test_the_frames_own_masks_are_not_looked_at(scene):
+    frames = [make_frame(None, mask, depth=scene.depth, K=scene.K) for mask in (None, scene.segmap)]
+    assert np.array_equal(segment(frames[0]), segment(frames[1]))
+
+
+def test_what_stands_beside_the_table_is_background(scene):
+    found = segment(make_frame(None, None, depth=scene.depth, K=scene.K))
+    wall = scene.depth > 1.3
+    assert wall.sum() > 100
+    assert not found[wall & (scene.segmap == 0)].any()
+
+
+def test_an_empty_table_and_no_table_are_told(scene):
+    v, _ = np.mgrid[:120, :160]
+    slope = (v - scene.K[1, 2]) / scene.K[1, 1]
+    table = 0.5 / (0.7 * slope + 0.7)  # a plane that is tilted by 45 degrees
+    with pytest.raises(FrameError, match="Nothing stands on the table"):
+        segment(make_frame(None, None, depth=table, K=scene.K))
+    clutter = np.random.default_rng(0).uniform(0.5, 5, scene.depth.shape)
+    with pytest.raises(FrameError, match="No support plane"):
+        segment(make_frame(None, None, depth=clutter, K=scene.K))
+
+
+def test_a_bowls_floor_is_filled_and_the_crook_of_a_bend_is_not():
+    plan = np.stack(np.meshgrid(np.arange(100) / 500, np.arange(100) / 500), axis=-1)
+    radius = np.linalg.norm(plan - 0.1, axis=-1)
+    everywhere = np.ones((100, 100), bool)
+    ring = ((radius > 0.06) & (radius < 0.08)).astype(np.int64) * 5
+    assert fill_inside(ring, plan, everywhere)[50, 50] == 5
+    assert (fill_inside(ring, plan, everywhere)[radius > 0.085] == 0).all()
+    assert np.array_equal(fill_inside(ring, plan, ~everywhere), ring)
+    half = np.where(plan[..., 0] < 0.1, ring, 0)
+    assert fill_inside(half, plan, everywhere)[50, 49] == 0
+
+
+def boxes(*placed):
+    """A frame of boxes (size, x, y, z) on a table, noisy; the true masks are its own, 1, 2, ..."""
+    things = {
+        number: in_camera(solids.moved(solids.box(*size), x=x, y=y, z=z), T_CAM_WORLD)
+        for number, (size, x, y, z) in enumerate(placed, start=1)
+    }
+    clean = photograph(things)
+    depth = noisy(np.nan_to_num(clean.points[..., 2]))
+    return make_frame(clean.rgb, clean.segmap, depth=depth, K=clean.K)
+
+
+@pytest.mark.parametrize(
+    "placed",
+    [
+        [((0.08, 0.08, 0.06), 0, -0.041, 0), ((0.08, 0.08, 0.16), -0.03, 0.041, 0)],
+        [((0.16, 0.14, 0.06), 0, 0, 0), ((0.07, 0.06, 0.07), 0, 0, 0.06)],
+    ],
+    ids=["side by side", "on top"],
+)
+def test_things_that_touch_are_two(placed):
+    frame = boxes(*placed)
+    found = segment(frame)
+    for truth in (1, 2):
+        best = max(overlap(found == i, frame.segmap == truth) for i in np.unique(found[found > 0]))
+        assert best > 0.7, truth
+
+
+@pytest.mark.parametrize(("top", "count"), [((210, 170, 20), 1), ((150, 40, 160), 2)])
+def test_a_stud_of_its_bricks_colour_is_no_thing_of_its_own(top, count):
+    frame = boxes(((0.16, 0.14, 0.06), 0, 0, 0), ((0.07, 0.06, 0.07), 0, 0, 0.06))
+    rgb = np.full((*frame.shape, 3), 120, np.uint8)
+    rgb[frame.segmap == 1] = (220, 180, 30)
+    rgb[frame.segmap == 2] = top
+    assert segment(replace(frame, rgb=rgb)).max() == count
+
+
+def test_hues_are_of_vivid_parts_alone_and_go_round():
+    parts = np.repeat([0, 1, 2, 3, 4], 50).reshape(5, 50)
+    rgb = np.zeros((5, 50, 3), np.uint8)
+    rgb[1] = 90, 90, 100
+    rgb[2, ::2], rgb[2, 1::2] = (200, 0, 10), (200, 10, 0)
+    rgb[3, ::2], rgb[3, 1::2] = (200, 0, 0), (0, 0, 200)
+    rgb[4] = 10, 200, 10
+    hues = vivid_hues(parts, rgb)
+    assert np.isnan(hues[[0, 1, 3]]).all()
+    assert same_hue(hues[2], 355.0) and same_hue(hues[4], 120.0)
+    assert not same_hue(hues[2], hues[4]) and not same_hue(hues[1], hues[1])
+
+
+def test_a_thin_thing_is_found():
+    frame = boxes(((0.16, 0.04, 0.01), 0, 0, 0))
+    assert overlap(segment(frame) == 1, frame.segmap == 1) > 0.6
+
+
+def test_a_mug_is_one_thing():
+    outside = trimesh.creation.cylinder(0.05, 0.1, sections=48)
+    inside = trimesh.creation.cylinder(0.044, 0.1, sections=48).apply_translation([0, 0, 0.008])
+    mug = in_camera(outside.difference(inside).apply_translation([0, 0, 0.05]), T_CAM_WORLD)
+    clean = photograph({1: mug})
+    depth = noisy(np.nan_to_num(clean.points[..., 2]))
+    found = segment(make_frame(None, None, depth=depth, K=clean.K))
+    assert overlap(found == 1, clean.segmap == 1) > 0.75

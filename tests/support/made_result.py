@@ -1,0 +1,121 @@
+"""A folder of results whose posteriors are known in closed form: a box and an L on a table."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import trimesh
+from table_scene import TABLE, in_camera, photograph, placed
+
+from brrp_cli.api import Reconstruction
+from brrp_cli.config import SurfaceConfig, preset
+from brrp_cli.inference.hinge import HingeGrid
+from brrp_cli.inference.hypothesis_posterior import HypothesisPosterior
+from brrp_cli.inference.posterior import HilbertPosterior
+from brrp_cli.inference.prior_mean import PriorMeanGrid
+from brrp_cli.raycast import raycasting_scene
+from brrp_cli.reconstruction import OK, TOO_FEW_POINTS, ObjectReconstruction, Retrieved
+from brrp_cli.results.write import write_results
+from brrp_cli.shapes import solids
+from brrp_cli.surface.extract import extract_surface
+
+BOX, ELL, SPECK = 7, -3, 40
+WIDTH = 0.002  # metres: a surface's place is logistic with this scale
+SPACING, MARGIN = 0.003, 0.03
+
+
+def solid_box() -> trimesh.Trimesh:
+    return solids.box(0.09, 0.06, 0.12)
+
+
+def hollow_ell() -> trimesh.Trimesh:
+    """An L that stands on its longer leg; above that leg is nothing."""
+    return solids.union(
+        solids.box(0.14, 0.05, 0.03), solids.moved(solids.box(0.03, 0.05, 0.10), x=-0.055)
+    )
+
+
+HOLLOW = (0.08, 0.03, 0.05)  # above the longer leg, world
+
+
+def truth() -> dict[int, trimesh.Trimesh]:
+    """Meshes by id, camera frame."""
+    return {
+        BOX: in_camera(solid_box(), placed(-0.1, 0.0, 0.5)),
+        ELL: in_camera(hollow_ell(), placed(0.08, 0.03, 0.0)),
+    }
+
+
+def posterior_on(
+    functions, bounds: np.ndarray, which=(0,), spacing: float = SPACING
+) -> HypothesisPosterior:
+    """Particles without corrections: particle i is hypothesis which[i], whose logit at points
+    (n, 3) is functions[which[i]](points)."""
+    shape = np.ceil((bounds[1] - bounds[0]) / spacing).astype(int) + 1
+    axes = [low + spacing * np.arange(n) for low, n in zip(bounds[0], shape, strict=True)]
+    nodes = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
+    values = np.stack([np.clip(f(nodes), -8, 8).reshape(shape) for f in functions])
+    grid = HingeGrid((0.0, 0.0, 0.0), (1, 1, 1), 1.0, 1e-7)
+    none = HilbertPosterior(
+        np.zeros((len(which), grid.dimension), np.float32), bounds.mean(axis=0), grid, 1.0
+    )
+    mean = PriorMeanGrid(bounds[0], spacing, values.astype(np.float16), outside=-8.0)
+    return HypothesisPosterior(mean, np.array(which), none)
+
+
+def around(mesh: trimesh.Trimesh) -> HypothesisPosterior:
+    """Logit -distance / WIDTH of a mesh in the camera frame, two particles of it."""
+    scene = raycasting_scene([mesh])
+
+    def logit(points: np.ndarray) -> np.ndarray:
+        distance = scene.compute_signed_distance(points.astype(np.float32), nsamples=11)
+        return -distance.numpy() / WIDTH
+
+    return posterior_on([logit], mesh.bounds + np.array([[-MARGIN], [MARGIN]]), which=(0, 0))
+
+
+def write_made_result(folder: Path, *, frame: str = "camera") -> Path:
+    """The box, the L, and a speck of four pixels without a mesh."""
+    meshes = truth()
+    seen = photograph(meshes)
+    segmap = seen.segmap.copy()
+    segmap[-2:, :2] = SPECK
+    seen = replace(seen, segmap=segmap)
+    # At a half the mesh is the true surface.
+    config = replace(preset("default"), surface=SurfaceConfig(level=0.5))
+    objects = [ObjectReconstruction(SPECK, TOO_FEW_POINTS, "4 valid depth points, 16 are needed")]
+    for object_id, mesh in meshes.items():
+        item = ObjectReconstruction(
+            object_id,
+            OK,
+            n_points=int((segmap == object_id).sum()),
+            retrieved=[
+                Retrieved(
+                    "a <b>box</b> & more", 0.75, np.eye(4), 1.0, alignment_score=0.9, weight=0.97
+                ),
+                Retrieved("mug", 0.05, np.eye(4), 0.9, alignment_score=0.2, weight=0.0),
+            ],
+            unknown_probability=0.2,
+            unknown_weight=0.03,
+            observed=seen.object_points(object_id),
+            posterior=around(mesh),
+            seconds={"retrieval": 0.5, "surface": 0.25},
+        )
+        item.surface = extract_surface(item.posterior, item.observed, config.surface)
+        objects.append(item)
+    result = Reconstruction(
+        frame=seen,
+        objects=sorted(objects, key=lambda o: o.object_id),
+        plane=TABLE,
+        method="brrp",
+        retriever="appearance",
+        prior_path=Path("prior"),
+        prior_digest="0" * 64,
+        configuration=config.as_dict(),
+        seed=0,
+        device="cpu",
+    )
+    write_results(result, folder, frame=frame)
+    return folder

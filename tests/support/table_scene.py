@@ -1,0 +1,91 @@
+"""Solids on a table seen by a camera whose every ray is cast, and the same solids as stored ones.
+
+World: z up, the table's top at z = 0.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import cache
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+import trimesh
+
+from brrp_cli.config import FeatureConfig
+from brrp_cli.demo.layout import camera_pose, turn
+from brrp_cli.frames.frame import Frame
+from brrp_cli.geometry import backproject, similarity
+from brrp_cli.observation.support_plane import Plane
+from brrp_cli.prior.build.find_meshes import MeshSource
+from brrp_cli.prior.build.make_object import make_object
+from brrp_cli.prior.objects import PriorObject
+from brrp_cli.prior.parameters import AppearanceConfig, BuildParameters
+from brrp_cli.raycast import look
+from brrp_cli.shapes import solids
+
+K = np.array([[300.0, 0, 160], [0, 300.0, 120], [0, 0, 1]])
+SHAPE = (240, 320)
+T_WORLD_CAM = camera_pose(np.array([0.0, 0.0, 0.03]), 0.7, 0.7, 0.4)
+T_CAM_WORLD = np.linalg.inv(T_WORLD_CAM)
+NORMAL = T_CAM_WORLD[:3, 2]
+TABLE = Plane(NORMAL, float(-NORMAL @ T_CAM_WORLD[:3, 3]))
+
+# The stored clouds and surfaces of a real prior, less of what these tests do not ask for.
+PARAMETERS = BuildParameters(
+    samples=500,
+    dense_points=8_000,
+    features=FeatureConfig(scales=(0.4, 0.5, 0.6)),
+    appearance=AppearanceConfig(views=2, rays=100),
+)
+
+
+def box() -> trimesh.Trimesh:
+    """Three different sides, so that it fits in one way up to half turns."""
+    return solids.box(0.10, 0.06, 0.14)
+
+
+def ell() -> trimesh.Trimesh:
+    """An L that stands on its longer leg: no turn maps it to itself."""
+    return solids.union(
+        solids.box(0.14, 0.05, 0.04), solids.moved(solids.box(0.03, 0.05, 0.10), x=-0.055)
+    )
+
+
+MESHES = {"box": box, "ell": ell}
+
+
+@cache
+def stored(name: str) -> PriorObject:
+    """One of `MESHES`, made as a build makes it."""
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / f"{name}.ply"
+        MESHES[name]().export(path)
+        return make_object(MeshSource(name, path, path.name), PARAMETERS)
+
+
+def placed(x: float, y: float, yaw: float) -> np.ndarray:
+    """T_cam_mesh (4, 4) of what stands on the table there, turned by `yaw`."""
+    return T_CAM_WORLD @ similarity(1.0, turn(yaw), np.array([x, y, 0.0]))
+
+
+def in_camera(mesh: trimesh.Trimesh, T_cam_mesh: np.ndarray) -> trimesh.Trimesh:
+    """A moved copy."""
+    copy = mesh.copy()
+    copy.apply_transform(T_cam_mesh)
+    return copy
+
+
+def photograph(things: Mapping[int, trimesh.Trimesh], *, table: bool = True) -> Frame:
+    """A frame of meshes by id, camera frame, on the table or in the air; depth without noise."""
+    slab = in_camera(solids.moved(solids.box(1.4, 1.4, 0.02), z=-0.02), T_CAM_WORLD)
+    sight = look([*things.values(), *([slab] if table else [])], K, SHAPE)
+    ids = np.array([*things, 0, 0])
+    return Frame(
+        rgb=np.full((*SHAPE, 3), 128, np.uint8),
+        points=backproject(sight.depth, K),
+        segmap=ids[np.where(sight.index < 0, len(things), sight.index)].astype(np.int64),
+        K=K,
+        T_world_cam=T_WORLD_CAM,
+    )
