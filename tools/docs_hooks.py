@@ -1,7 +1,6 @@
-"""MkDocs hook: what mkdocs-click makes of the commands, mended.
+"""MkDocs hook: the examples in the commands' help texts become code blocks.
 
-It takes a help text as Markdown, in which the lines of an example would run together, and shows the
-mark by which click tells that an option has no default.
+mkdocs-click takes a help text as Markdown, in which the lines of an example would run together.
 """
 
 from __future__ import annotations
@@ -10,13 +9,11 @@ import re
 from typing import Any
 
 _EXAMPLE = re.compile(r"<p>(Examples?:)\n(.*?)</p>", re.DOTALL)
-_NOTHING = re.compile(r"<td>(?:<code>Sentinel\.UNSET</code>|N/A)</td>")
 
 
 def on_page_content(html: str, **_: Any) -> str:
     """Called by MkDocs with the HTML of each page."""
-    html = _EXAMPLE.sub(_block, html)
-    return _NOTHING.sub("<td></td>", html)
+    return _EXAMPLE.sub(_block, html)
 
 
 def _block(found: re.Match[str]) -> str:

@@ -244,15 +244,12 @@ def test_the_readme_is_read_in_five_minutes() -> None:
 
 
 def test_the_reference_holds_every_command_and_option() -> None:
-    html = on_page_content(
-        markdown.markdown(REFERENCE.read_text(), extensions=["attr_list", "tables", "mkdocs-click"])
-    )
-    assert "Sentinel" not in html
+    extensions = ["attr_list", "mkdocs-click", "tables"]
+    html = on_page_content(markdown.markdown(REFERENCE.read_text(), extensions=extensions))
     parts = re.split(r'<h\d [^>]*id="(brrp[\w-]*)"', html)
     sections = dict(zip(parts[1::2], parts[2::2], strict=True))
     for path, command in all_commands().items():
         section = sections[slugify(" ".join(("brrp", *path)), "-")]
-        missing = {name for name in options(command) if f"<code>{name}</code>" not in section}
-        assert missing == set(), path
-        if path:
-            assert f"<pre><code>{' '.join(('brrp', *path))}" in section
+        assert options(command) <= set(re.findall(r"(?<![\w-])-{1,2}[\w-]+", section)), path
+        if not isinstance(command, click.Group):
+            assert f"<pre><code>{' '.join(('brrp', *path))}" in section, "no example"
