@@ -138,11 +138,15 @@ class SearchConfig:
     Starts are `matchings` feature matchings and every resting pose turned `turns` times. The best
     `coarse` of them slide `coarse_steps` steps with `coarse_points` observed points, which reach
     the surface from `coarse_distance`; the best `middle` of those, and then the best `fine`, slide
-    again, each with more points. The best `rescaled` are then tried at `scales` times the true
-    size; the alignment score falls by scale_cost * ln(scale)^2. No other size is tried where it
-    reaches `settled`, and nothing is refined further where none of the placements reaches
-    `hopeless` or all stay `beaten` behind another model's.
-    Of placements whose surfaces lie within `distinct` metres the best is kept, `kept` in all.
+    again, each with more points. A stored object has its stored size. That it is something of the
+    kind, of another size, is a hypothesis of its own, with a size that is refined with the pose:
+    the best `rescaled` placements begin it at `sizes` times the true size, observed points pull
+    from `size_distance` metres, and sizes whose logarithm is within `least_size_change` of 0 or
+    beyond `most_size` are dropped. Its alignment score falls by size_cost, which over `sharpness`
+    (see WeighConfig) is the log odds against another size, and by size_spread_cost * ln(size)^2. No
+    other size is tried where the score reaches `settled`, and nothing is refined further where none
+    of the placements reaches `hopeless` or all stay `beaten` behind another model's. Of placements
+    whose surfaces lie within `distinct` metres the best is kept, `kept` in all.
     """
 
     turns: int = 24
@@ -162,10 +166,13 @@ class SearchConfig:
     fine_points: int = 1000
     fine_steps: int = 10
     seen_points: int = 150
-    scales: tuple[float, ...] = (0.8, 0.9, 1.1, 1.25)
+    sizes: tuple[float, ...] = (0.85, 1.18)
     rescaled: int = 2
-    scale_distance: float = 0.015
-    scale_cost: float = 0.6
+    size_distance: float = 0.015
+    size_cost: float = 0.1
+    size_spread_cost: float = 0.6
+    least_size_change: float = 0.04
+    most_size: float = 0.5
     hopeless: float = 0.1
     beaten: float = 0.3
     settled: float = 0.9
