@@ -4,7 +4,8 @@
                            - lambda_norm * |w|^2
 
 Particles are shared out among the hypotheses in proportion to their weights, so that the spread of
-the particles holds what is not known of identity and pose, besides what was not seen.
+the particles holds what is not known of identity and pose, besides what was not seen. Each
+hypothesis has a posterior of its own over w, and SVGD runs for its particles by themselves.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ from brrp_cli.inference.hypothesis_posterior import HypothesisPosterior
 from brrp_cli.inference.infer import LabelledPoints
 from brrp_cli.inference.mean import MeanLattice
 from brrp_cli.inference.posterior import HilbertPosterior
-from brrp_cli.inference.svgd import run_svgd
+from brrp_cli.inference.svgd import groups_of, run_svgd
 from brrp_cli.seeds import child_seed
 
 Array = NDArray[np.float64]
@@ -69,7 +70,11 @@ def infer_correction(
     start = config.start * torch.randn(len(which), grid.dimension, generator=generator)
     start[:, 0] = 0
     weights = run_svgd(
-        start.to(device), score, steps=config.steps, learning_rate=config.learning_rate
+        start.to(device),
+        score,
+        steps=config.steps,
+        learning_rate=config.learning_rate,
+        groups=groups_of(torch.from_numpy(which).to(device)),
     )
     reach = float((problem.box[1] - problem.box[0]).max() / 2)
     correction = HilbertPosterior(weights.cpu().numpy(), center, grid, reach)
