@@ -147,6 +147,7 @@ def test_the_benchmark_keeps_what_it_measured(frame, tmp_path):
     assert "registration" in result.output and "GFLOP/s" in result.output
     (line,) = history.read_text().splitlines()
     record = json.loads(line)
+    assert record["frames"][0]["denormals"] == {} and "denormal numbers: none" in result.output
     assert record["machine"]["flops"] > 0 and record["peak_megabytes"] > 0
     (found,) = record["frames"]
     assert found["objects"] == 1 and set(found["limits"]) <= set(found["stages"])
