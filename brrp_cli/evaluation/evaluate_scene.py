@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from brrp_cli.config import Config
 from brrp_cli.errors import BrrpError
 from brrp_cli.evaluation.memory import peak_megabytes, reset_peak
 from brrp_cli.evaluation.perturb import shift_masks, with_noise
@@ -20,10 +20,11 @@ from brrp_cli.frames.frame import Frame
 from brrp_cli.ground_truth.scenes import Scene
 from brrp_cli.ground_truth.true_meshes import close_truth
 from brrp_cli.ground_truth.true_shape import TrueShape, true_shape
-from brrp_cli.methods.registry import METHODS, Setup
+from brrp_cli.methods.base import Setup
+from brrp_cli.methods.registry import METHODS
 from brrp_cli.prior.objects import PriorObject
 from brrp_cli.prior.store import Prior, open_prior
-from brrp_cli.reconstruction import FAILED, ObjectReconstruction
+from brrp_cli.reconstruction import FAILED, ObjectReconstruction, Reconstruction
 from brrp_cli.retrieval.base import unknown
 from brrp_cli.retrieval.cached import RememberingRetriever
 from brrp_cli.seeds import child_rng
@@ -83,21 +84,44 @@ def _reconstruct(
     memory: dict[str, RememberingRetriever],
 ) -> tuple[dict[int, ObjectReconstruction] | BrrpError, float]:
     """What the method found, by id, and the peak of memory in MB."""
-    weights = None if variant.weights is None else plan.weights[variant.weights]
-    setup = Setup(variant.config, plan.seed, plan.device, weights=weights)
+    method = METHODS[variant.method]
+    prior, retriever = None, None
     reset_peak()
     try:
-        if METHODS[variant.method].uses_prior:
+        if method.uses_prior:
             assert plan.prior is not None
             prior = _prior(plan.prior)
+        if prior is not None and method.uses_retriever:
             key = _memory_key(variant)
             if key not in memory:
                 memory[key] = RememberingRetriever(_retriever(plan, scene, variant, prior))
-            setup = Setup(variant.config, plan.seed, plan.device, prior, memory[key])
-        found = METHODS[variant.method].run(frame, setup)
+            retriever = memory[key]
+        setup = Setup(
+            config=variant.config,
+            seed=plan.seed,
+            device=plan.device if method.uses_cuda else "cpu",
+            prior=prior,
+            retriever=retriever,
+            weights=None if variant.weights is None else plan.weights[variant.weights],
+            # Scenes are shared out among processes.
+            workers=1,
+        )
+        found = method.run(frame, setup)
     except BrrpError as error:
         return error, peak_megabytes()
-    return {item.object_id: item for item in found}, peak_megabytes()
+    return _by_id(found), peak_megabytes()
+
+
+def _by_id(found: Reconstruction) -> dict[int, ObjectReconstruction]:
+    """The objects, each with its equal share of the time of stages that concern the whole frame."""
+    share = {
+        stage: found.seconds[stage] / len(found.objects)
+        for stage in STAGES
+        if stage in found.seconds and found.objects
+    }
+    return {
+        item.object_id: replace(item, seconds={**share, **item.seconds}) for item in found.objects
+    }
 
 
 def _memory_key(variant: Variant) -> str:
@@ -116,7 +140,7 @@ def _retriever(plan: Plan, scene: Scene, variant: Variant, prior: Prior) -> Retr
 
 @cache
 def _found_retriever(
-    name: str, prior: Path, config: Config, seed: int, clip_dir: Path | None
+    name: str, prior: Path, config: Any, seed: int, clip_dir: Path | None
 ) -> Retriever:
     from brrp_cli.retrieval.choose import choose_retriever
 
@@ -158,14 +182,14 @@ def _row(
     row |= {"status": item.status, "message": item.message, "points": item.n_points}
     row |= _seconds(item, memory.get(_memory_key(variant)))
     retriever = memory.get(_memory_key(variant))
-    if METHODS[variant.method].uses_prior and retriever is not None and plan.prior is not None:
+    if METHODS[variant.method].uses_retriever and retriever is not None and plan.prior is not None:
         row |= _retrieval(_prior(plan.prior).names, retriever, row["name"], item)
     if isinstance(truth, BrrpError):
         return {**row, "status": FAILED, "message": str(truth)}
     if item.posterior is not None:
         rng = child_rng(plan.seed, "score", scene.name, object_id)
         scores, diagrams = score_probabilities(item.posterior, truth)
-        level = METHODS[variant.method].level(variant.config)
+        level = variant.config.surface.level
         row |= {**score_shape(item.posterior, truth, rng, level), **scores, "diagrams": diagrams}
     placed = [r for r in item.retrieved if r.T_cam_object is not None]
     if placed and plan.prior is not None:
