@@ -99,7 +99,7 @@ def main(
     examples_only: bool,
 ) -> None:
     """Train on SCENES, or on the examples that are in OUTPUT already."""
-    from brrp_cli.api import pick_device
+    from brrp_cli.device import pick_device
     from brrp_cli.methods.pointsdf.network import NetworkConfig
     from brrp_cli.training.pointsdf import Training, TrainingConfig, split
 
