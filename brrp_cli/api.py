@@ -98,10 +98,9 @@ def reconstruct(
     "pointsdf", which needs `weights`, a file that tools/train_pointsdf.py wrote. The last two take
     the surface alone from `config`
     retriever : P(c|R); without one, CLIP if `BRRP_CLIP_DIR` is set or CLIP was fetched, else
-    appearance, else (with a prior of an older brrp) registration fitness. An object that cannot be
-    reconstructed gets a status; the others still are. The frame is never changed. The same seed
-    gives the same result, whatever the number of `workers`: objects at a time, by default as many
-    as there are cores.
+    appearance. An object that cannot be reconstructed gets a status; the others still are. The
+    frame is never changed. The same seed gives the same result, whatever the number of `workers`:
+    objects at a time, by default as many as there are cores.
 
     Errors: BrrpError for an unknown method, or a prior, retriever or weights that it lacks or
     cannot use; PriorError for a shard that is damaged, when an object is read from it.
