@@ -36,7 +36,7 @@ from tqdm import tqdm
 # The script also runs from a checkout that is not installed.
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from brrp_cli.inference.prior_mean import empty_space
+from brrp_cli.completion.completed_mean import empty_space
 
 from brrp_cli.completion.network import Network
 from brrp_cli.completion.point_features import COUNT, WHOLE, point_features
