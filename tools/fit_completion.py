@@ -37,7 +37,6 @@ from tqdm import tqdm
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from brrp_cli.completion.completed_mean import empty_space
-
 from brrp_cli.completion.network import Network
 from brrp_cli.completion.point_features import COUNT, WHOLE, point_features
 from brrp_cli.completion.visible_part import visible_part
