@@ -73,7 +73,7 @@ class Detector:
             )
         # Tokens beyond the phrase are -inf, which is a score of 0.
         best = np.nan_to_num(logits[0].astype(np.float64), nan=-np.inf).max(axis=1)
-        scores = 1.0 / (1.0 + np.exp(-np.clip(best, -60, 60)))
+        scores = import_library("scipy.special").expit(best)
         height, width = rgb.shape[:2]
         middle, size = boxes[0, :, :2].astype(np.float64), boxes[0, :, 2:].astype(np.float64)
         corners = np.concatenate([middle - size / 2, middle + size / 2], axis=1)
