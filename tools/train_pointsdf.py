@@ -102,7 +102,7 @@ def main(
     """Train on SCENES, or on the examples that are in OUTPUT already."""
     from training.pointsdf import Training, TrainingConfig, narrowed, split
 
-    from brrp_cli.api import pick_device
+    from brrp_cli.device import pick_device
     from brrp_cli.methods.pointsdf.network import NetworkConfig
 
     began = monotonic()

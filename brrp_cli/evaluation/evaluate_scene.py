@@ -2,28 +2,36 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from brrp_cli.config import Config
 from brrp_cli.errors import BrrpError
 from brrp_cli.evaluation.memory import peak_megabytes, reset_peak
 from brrp_cli.evaluation.perturb import shift_masks, with_noise
+from brrp_cli.evaluation.recognition import half_extent, recognition
 from brrp_cli.evaluation.rows import STAGES, Row, RowLog, variant_columns
 from brrp_cli.evaluation.score_object import placement_error, score_probabilities, score_shape
 from brrp_cli.evaluation.variants import Variant
 from brrp_cli.evaluation.work import Plan, lost_row
 from brrp_cli.frames.frame import Frame
 from brrp_cli.ground_truth.scenes import Scene
+from brrp_cli.ground_truth.surface_metrics import (
+    TrueSurface,
+    no_surface,
+    score_surface,
+    true_surface,
+)
 from brrp_cli.ground_truth.true_meshes import close_truth
 from brrp_cli.ground_truth.true_shape import TrueShape, true_shape
-from brrp_cli.methods.registry import METHODS, Setup
+from brrp_cli.methods.base import Setup
+from brrp_cli.methods.registry import METHODS
 from brrp_cli.prior.objects import PriorObject
 from brrp_cli.prior.store import Prior, open_prior
-from brrp_cli.reconstruction import FAILED, ObjectReconstruction
+from brrp_cli.reconstruction import FAILED, ObjectReconstruction, Reconstruction
 from brrp_cli.retrieval.base import unknown
 from brrp_cli.retrieval.cached import RememberingRetriever
 from brrp_cli.seeds import child_rng
@@ -47,7 +55,7 @@ def evaluate_scene(plan: Plan, scene: Scene, variants: list[Variant], log: Path)
         rows.append(lost_row(scene.name, plan.view, v, str(error)) for v in variants)
         return
     seen = with_noise(clean, child_rng(plan.seed, "noise", scene.name)) if plan.noise else clean
-    truths = _truths(plan, scene, clean)
+    truths = true_objects(plan, scene, clean)
     memory: dict[str, RememberingRetriever] = {}
     for variant in variants:
         frame = shift_masks(seen, variant.shift)
@@ -60,16 +68,31 @@ def evaluate_scene(plan: Plan, scene: Scene, variants: list[Variant], log: Path)
             _draw(plan.pictures, scene, frame, variant, found)
 
 
-def _truths(plan: Plan, scene: Scene, clean: Frame) -> dict[int, TrueShape | BrrpError]:
-    """The true shape of each object with enough pixels, or why there is none; by id."""
-    truths: dict[int, TrueShape | BrrpError] = {}
+class Truth(NamedTuple):
+    """One true object: occupancy on grids and its surface, camera frame; `half_extent`: half the
+    longest side of its box along its own axes, metres."""
+
+    shape: TrueShape
+    surface: TrueSurface
+    half_extent: float
+
+
+def true_objects(plan: Plan, scene: Scene, clean: Frame) -> dict[int, Truth | BrrpError]:
+    """The truth of each object with enough pixels, or why there is none; by id."""
+    assert clean.T_world_cam is not None
+    truths: dict[int, Truth | BrrpError] = {}
     for object_id in clean.object_ids:
         if np.count_nonzero(clean.segmap == object_id) < MIN_PIXELS:
             continue
         rng = child_rng(plan.seed, "truth", scene.name, object_id)
         try:
-            meshes = close_truth(scene.object(object_id), plan.data_root, plan.cache)
-            truths[object_id] = true_shape(meshes, clean, rng)
+            true_object = scene.object(object_id)
+            meshes = close_truth(true_object, plan.data_root, plan.cache)
+            shape = true_shape(meshes, clean, rng)
+            rng = child_rng(plan.seed, "true surface", scene.name, object_id)
+            surface = true_surface(shape.mesh, clean, object_id, rng)
+            size = half_extent(meshes.exact.vertices, true_object.T_world_object)
+            truths[object_id] = Truth(shape, surface, size)
         except BrrpError as error:
             truths[object_id] = error
     return truths
@@ -83,21 +106,44 @@ def _reconstruct(
     memory: dict[str, RememberingRetriever],
 ) -> tuple[dict[int, ObjectReconstruction] | BrrpError, float]:
     """What the method found, by id, and the peak of memory in MB."""
-    weights = None if variant.weights is None else plan.weights[variant.weights]
-    setup = Setup(variant.config, plan.seed, plan.device, weights=weights)
+    method = METHODS[variant.method]
+    prior, retriever = None, None
     reset_peak()
     try:
-        if METHODS[variant.method].uses_prior:
+        if method.uses_prior:
             assert plan.prior is not None
             prior = _prior(plan.prior)
+        if prior is not None and method.uses_retriever:
             key = _memory_key(variant)
             if key not in memory:
                 memory[key] = RememberingRetriever(_retriever(plan, scene, variant, prior))
-            setup = Setup(variant.config, plan.seed, plan.device, prior, memory[key])
-        found = METHODS[variant.method].run(frame, setup)
+            retriever = memory[key]
+        setup = Setup(
+            config=variant.config,
+            seed=plan.seed,
+            device=plan.device if method.uses_cuda else "cpu",
+            prior=prior,
+            retriever=retriever,
+            weights=None if variant.weights is None else plan.weights[variant.weights],
+            # Scenes are shared out among processes.
+            workers=1,
+        )
+        found = method.run(frame, setup)
     except BrrpError as error:
         return error, peak_megabytes()
-    return {item.object_id: item for item in found}, peak_megabytes()
+    return _by_id(found), peak_megabytes()
+
+
+def _by_id(found: Reconstruction) -> dict[int, ObjectReconstruction]:
+    """The objects, each with its equal share of the time of stages that concern the whole frame."""
+    share = {
+        stage: found.seconds[stage] / len(found.objects)
+        for stage in STAGES
+        if stage in found.seconds and found.objects
+    }
+    return {
+        item.object_id: replace(item, seconds={**share, **item.seconds}) for item in found.objects
+    }
 
 
 def _memory_key(variant: Variant) -> str:
@@ -116,7 +162,7 @@ def _retriever(plan: Plan, scene: Scene, variant: Variant, prior: Prior) -> Retr
 
 @cache
 def _found_retriever(
-    name: str, prior: Path, config: Config, seed: int, clip_dir: Path | None
+    name: str, prior: Path, config: Any, seed: int, clip_dir: Path | None
 ) -> Retriever:
     from brrp_cli.retrieval.choose import choose_retriever
 
@@ -134,7 +180,7 @@ def _row(
     variant: Variant,
     clean: Frame,
     object_id: int,
-    truths: dict[int, TrueShape | BrrpError],
+    truths: dict[int, Truth | BrrpError],
     found: dict[int, ObjectReconstruction] | BrrpError,
     memory: dict[str, RememberingRetriever],
     peak: float,
@@ -150,6 +196,11 @@ def _row(
         "peak_memory_mb": peak,
     }
     truth = truths[object_id]
+    if not isinstance(truth, BrrpError):
+        surface = truth.surface
+        row |= {"thickness": surface.thickness, "thickness_class": surface.thickness_class}
+        # What fails has no mesh, which counts.
+        row |= no_surface() if METHODS[variant.method].gives_shapes else {}
     if isinstance(found, BrrpError):
         return {**row, "status": FAILED, "message": str(found)}
     item = found.get(object_id)
@@ -158,19 +209,26 @@ def _row(
     row |= {"status": item.status, "message": item.message, "points": item.n_points}
     row |= _seconds(item, memory.get(_memory_key(variant)))
     retriever = memory.get(_memory_key(variant))
-    if METHODS[variant.method].uses_prior and retriever is not None and plan.prior is not None:
+    if METHODS[variant.method].uses_retriever and retriever is not None and plan.prior is not None:
         row |= _retrieval(_prior(plan.prior).names, retriever, row["name"], item)
     if isinstance(truth, BrrpError):
         return {**row, "status": FAILED, "message": str(truth)}
+    if item.surface is not None:
+        rng = child_rng(plan.seed, "written", scene.name, object_id)
+        row |= score_surface(item.surface.as_trimesh(), truth.surface, rng)
     if item.posterior is not None:
         rng = child_rng(plan.seed, "score", scene.name, object_id)
-        scores, diagrams = score_probabilities(item.posterior, truth)
-        level = METHODS[variant.method].level(variant.config)
-        row |= {**score_shape(item.posterior, truth, rng, level), **scores, "diagrams": diagrams}
+        scores, diagrams = score_probabilities(item.posterior, truth.shape)
+        level = variant.config.surface.level
+        shape = score_shape(item.posterior, truth.shape, rng, level)
+        row |= {**shape, **scores, "diagrams": diagrams}
+    if plan.prior is not None:
+        in_prior = row["name"] in _prior(plan.prior).names
+        row |= recognition(item, row["name"], in_prior, truth.half_extent)
     placed = [r for r in item.retrieved if r.T_cam_object is not None]
     if placed and plan.prior is not None:
         row["placement_error"] = placement_error(
-            placed[0], _stored(plan.prior, placed[0].name), truth
+            placed[0], _stored(plan.prior, placed[0].name), truth.shape
         )
     return row
 

@@ -18,8 +18,7 @@ from typing import Any
 
 from brrp_cli.errors import PriorError
 from brrp_cli.files import parse_json, write_bytes
-from brrp_cli.prior.build.find_meshes import safe_name
-from brrp_cli.prior.build.shard_plan import APPEARANCE_NAME, SHARD_NAME
+from brrp_cli.prior.names import APPEARANCE_NAME, SHARD_NAME, safe_name
 
 SCHEMA = 2
 KIND = "brrp-prior"

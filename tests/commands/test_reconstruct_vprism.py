@@ -170,7 +170,7 @@ def test_the_posterior_can_be_asked_again(out, again):
     [
         ("--prior", "prior/"),
         ("--k", 3),
-        ("--preset", "default"),
+        ("--preset", "paper"),
         ("--retriever", "uniform"),
         ("--clip-dir", "clip/"),
         ("--device", "cuda"),
