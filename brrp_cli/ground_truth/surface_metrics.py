@@ -20,6 +20,7 @@ from brrp_cli.geometry import normalise
 from brrp_cli.ground_truth.thickness import thickness_class
 from brrp_cli.ground_truth.true_meshes import ClosedMeshes
 from brrp_cli.raycast import raycasting_scene
+from brrp_cli.seeds import child_rng
 
 if TYPE_CHECKING:
     import trimesh
@@ -137,10 +138,14 @@ class TrueSurface:
 
 
 def true_surface(
-    meshes: ClosedMeshes, frame: Frame, object_id: int, rng: np.random.Generator
+    meshes: ClosedMeshes, frame: Frame, object_id: int, scene: str, seed: int
 ) -> TrueSurface:
-    """The true surface of an object of `frame` whose meshes are in the camera frame, metres."""
+    """The true surface of an object of `frame` whose meshes are in the camera frame, metres.
+
+    scene, seed : decide, with the object, which points are drawn
+    """
     surface = MeshSurface(meshes.exact)
+    rng = child_rng(seed, "true surface", scene, object_id)
     points, normals = surface.sample(SURFACE_POINTS, rng)
     seen = camera_sees(surface, points, frame, object_id)
     return TrueSurface(
@@ -207,6 +212,13 @@ def score_surface(
     }
 
 
+def score_written(
+    mesh: trimesh.Trimesh | None, truth: TrueSurface, scene: str, seed: int
+) -> dict[str, float]:
+    """`score_surface` with the points that scene, object and seed decide."""
+    return score_surface(mesh, truth, child_rng(seed, "written", scene, truth.object_id))
+
+
 def no_surface() -> dict[str, float]:
     """What an object without a mesh scores."""
     zero = (*F_SCORES, *VOLUME_SHARES, "watertight", "pieces", "one_piece")
@@ -214,9 +226,8 @@ def no_surface() -> dict[str, float]:
 
 
 def _solidity(mesh: trimesh.Trimesh, truth: TrueSurface) -> dict[str, float]:
-    from brrp_cli.prior.build.solids import is_solid
-
-    closed = is_solid(mesh)
+    # Every edge has two faces, wound alike, and the volume is above 0.
+    closed = bool(mesh.is_volume)
     ratio = float(mesh.volume / truth.surface.mesh.volume) if closed else float("nan")
     pieces = int(mesh.body_count)
     return {
