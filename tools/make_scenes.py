@@ -4,8 +4,8 @@ PyBullet drops 3 to 10 objects on a table, lets them settle and draws colour, de
 from random views (0.6 to 1 m away, 25 to 60 degrees above the table). A scene depends on the
 meshes, the seed and its number alone. Needs `pip install .[sim]`.
 
-The three sets of the README, and the same scenes as a structured-light camera sees them (`ycb` is
-the folder with YCB's archives unpacked, NNN_name/google_16k/textured.obj):
+The three sets of docs/accuracy.md, and the same scenes as a structured-light camera sees them
+(`ycb` is the folder with YCB's archives unpacked, NNN_name/google_16k/textured.obj):
 
     UNSEEN=030,031,032,065-b,065-d,072-a,073-e
     python tools/make_scenes.py --meshes ycb --skip $UNSEEN --scenes 20 -o scenes/prior

@@ -115,7 +115,7 @@ class Tower:
                 "The model fails when it is run",
                 where=self.path,
                 found=str(error).splitlines()[0],
-                fix="use one of the two published repositories; see README for their names",
+                fix="use one of the two published repositories that docs/retrieval.md names",
             ) from error
         out = np.asarray(out)
         if out.ndim != 2 or len(out) != len(full):
