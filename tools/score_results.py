@@ -2,14 +2,15 @@
 
     python tools/score_results.py OUT/ --truth SCENE/VIEW --data-root DATA [-o scores.csv]
 
-OUT holds `object_ID.ply`, as `brrp reconstruct` writes them; ID is the object's value in the masks of
-the view. Any other program's meshes serve too: metres, in the camera frame (x right, y down, z
+OUT holds `object_ID.ply`, as `brrp reconstruct` writes them; ID is the object's value in the masks
+of the view. Any other program's meshes serve too: metres, in the camera frame (x right, y down, z
 forward), or in the world's with `--frame world`; result.json, where there is one, tells which.
-The truth is a view of the published layout (SCENE/0000) or NAME.npz with NAME.truth.json beside it.
+The truth is a view of the published layout (SCENE/0000), or NAME.npz with NAME.truth.json beside
+it.
 
-One line for each object with at least 16 pixels in the view, and means; the metrics and their points
-are those of `brrp eval` (see score_surface in brrp_cli/ground_truth/surface_metrics.py). An object
-without a mesh has an F-score of 0 and no distance.
+One line for each object with at least 16 pixels in the view, and means; the metrics and their
+points are those of `brrp eval` (see score_surface in brrp_cli/ground_truth/surface_metrics.py). An
+object without a mesh has F-scores of 0 and no distance.
 """
 
 from __future__ import annotations
@@ -33,7 +34,7 @@ from brrp_cli.evaluation.evaluate_scene import MIN_PIXELS
 from brrp_cli.frames.frame import Frame
 from brrp_cli.ground_truth.scenes import Scene, find_scenes
 from brrp_cli.ground_truth.surface_metrics import score_written, true_surface
-from brrp_cli.ground_truth.true_meshes import close_truth, truth_cache
+from brrp_cli.ground_truth.true_meshes import exact_truth, truth_cache
 
 Row = dict[str, Any]
 
@@ -103,8 +104,8 @@ def score_folder(
     for object_id in frame.object_ids:
         if np.count_nonzero(frame.segmap == object_id) < MIN_PIXELS:
             continue
-        meshes = close_truth(scene.object(object_id), data_root, truth_cache()).moved(T_cam_world)
-        truth = true_surface(meshes, frame, object_id, scene.name, seed)
+        exact = exact_truth(scene.object(object_id), data_root, truth_cache()).moved(T_cam_world)
+        truth = true_surface(exact, frame, object_id, scene.name, seed)
         path = results / f"object_{object_id}.ply"
         mesh = read_mesh(path).apply_transform(T_cam_mesh) if path.is_file() else None
         rows.append(

@@ -89,7 +89,7 @@ def true_objects(plan: Plan, scene: Scene, clean: Frame) -> dict[int, Truth | Br
             true_object = scene.object(object_id)
             meshes = close_truth(true_object, plan.data_root, plan.cache)
             shape = true_shape(meshes, clean, rng)
-            surface = true_surface(shape.mesh, clean, object_id, scene.name, plan.seed)
+            surface = true_surface(shape.mesh.measured, clean, object_id, scene.name, plan.seed)
             size = half_extent(meshes.exact.vertices, true_object.T_world_object)
             truths[object_id] = Truth(shape, surface, size)
         except BrrpError as error:

@@ -23,8 +23,8 @@ Labels = dict[Variant, str]
 def write_plots(folder: Path, summaries: Sequence[VariantSummary], labels: Labels) -> list[Path]:
     """Every plot that these variants allow; returns the files.
 
-    distance.png, chamfer.png, reliability.png, timing.png; iou_k.png where k varies; iou_shift.png where shifted
-    and unshifted masks are both there.
+    distance.png, chamfer.png, reliability.png, timing.png; iou_k.png where k varies; iou_shift.png
+    where shifted and unshifted masks are both there.
     """
     figures = {
         "distance": distance_bars(summaries, labels),
