@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from multiprocessing.connection import Connection, wait
 from typing import Any
 
-from brrp_cli.errors import BrrpError
+from brrp_cli.errors import BrrpError, unexpected
 
 _CONTEXT = multiprocessing.get_context("spawn")
 # Seconds that a worker with nothing to do may take to end.
@@ -135,7 +135,7 @@ def _serve(pipe: Connection, function: Callable[..., Any]) -> None:
         except BrrpError as error:
             result = error
         except Exception as error:
-            result = BrrpError("An error that brrp does not know", found=repr(error))
+            result = unexpected(error)
         try:
             pipe.send(result)
         except ConnectionError:
