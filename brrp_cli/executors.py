@@ -15,7 +15,7 @@ from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from typing import Any
 
-from brrp_cli.errors import BrrpError
+from brrp_cli.errors import BrrpError, unexpected
 
 # Seconds that a worker which is to stop may take to end by itself.
 PATIENCE = 1.0
@@ -72,7 +72,7 @@ def _call(function: Callable[..., Any], task: tuple[Any, ...]) -> Any:
     except BrrpError as error:
         return error
     except Exception as error:
-        return BrrpError("An error that brrp does not know", found=repr(error))
+        return unexpected(error)
 
 
 def _result(future: Future[Any], time_limit: float) -> Any:
