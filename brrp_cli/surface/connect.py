@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -17,6 +20,8 @@ STEP = 0.1
 LEAST = 1e-4
 # Nodes around the parts that a route may take.
 MARGIN = 8
+# Nodes of the largest grid that is searched at once; what no route may cross.
+COARSE, CLOSED = 10_000, -1.0
 
 
 def one_piece(
@@ -96,26 +101,56 @@ def _joined(
     """`piece` and the parts `others`, each with the way to it along which the sum of negative log
     probabilities, `share` of the level's, is least, `radius` nodes thick. The nearest, in that
     sense, comes first, and the next may join it there."""
-    from skimage.graph import MCP_Geometric
-
     wanted = np.isin(parts, others)
     window = _window(piece | wanted, margin=MARGIN)
-    piece_in, parts_in = piece[window].copy(), parts[window]
+    piece_in, parts_in, wanted = piece[window].copy(), parts[window], wanted[window]
     cost = STEP - np.log(np.clip(share[window], LEAST, 1.0))
-    wanted = wanted[window]
     while wanted.any():
-        ways = MCP_Geometric(cost)
-        ends = np.argwhere(_border(wanted))
-        starts = np.argwhere(_border(piece_in))
-        costs, _ = ways.find_costs(starts.tolist(), ends.tolist(), find_all_ends=False)
-        end = ends[np.argmin(costs[tuple(ends.T)])]
-        piece_in |= _thick(np.array(ways.traceback(end)), piece_in.shape, radius)
-        reached = parts_in == parts_in[tuple(end)]
-        piece_in |= reached
+        way = _cheapest_way(cost, piece_in, wanted)
+        reached = parts_in == parts_in[tuple(way[-1])]
+        piece_in |= reached | _thick(way, piece_in.shape, radius)
         wanted &= ~reached
     result = piece.copy()
     result[window] = piece_in
     return result
+
+
+def _cheapest_way(cost: NDArray[np.floating], start: Region, end: Region) -> Nodes:
+    """Nodes (n, 3) of the cheapest way from one region to another.
+
+    It is first looked for on a grid of half the nodes along each axis, and then near that way: on
+    the whole grid, a search takes half a second.
+    """
+    if cost.size > COARSE:
+        padded = [(0, n % 2) for n in cost.shape]
+        coarse = _halved(np.pad(cost, padded, mode="edge"), np.min)
+        regions = [_halved(np.pad(region, padded), np.max) for region in (start, end)]
+        rough = _thick(_way(coarse, *regions), coarse.shape, 1.8)
+        near = rough.repeat(2, 0).repeat(2, 1).repeat(2, 2)[tuple(map(slice, cost.shape))]
+        cost = np.where(near, cost, CLOSED)
+        start, end = start & near, end & near
+    return _way(cost, start, end)
+
+
+def _way(cost: NDArray[np.floating], start: Region, end: Region) -> Nodes:
+    """As _cheapest_way, by Dijkstra's algorithm; a region may overlap the other."""
+    from skimage.graph import MCP_Geometric
+
+    both = np.argwhere(start & end)
+    if len(both):
+        return both[:1]
+    ends = np.argwhere(_border(end))
+    ways = MCP_Geometric(np.where(start & ~_border(start), CLOSED, cost))
+    costs, _ = ways.find_costs(
+        np.argwhere(_border(start)).tolist(), ends.tolist(), find_all_ends=False
+    )
+    return np.array(ways.traceback(ends[np.argmin(costs[tuple(ends.T)])]))
+
+
+def _halved(values: NDArray[Any], of: Callable[..., NDArray[Any]]) -> NDArray[Any]:
+    """Of each 2 x 2 x 2 values of an array with even sides, the one that `of` takes."""
+    x, y, z = (n // 2 for n in values.shape)
+    return of(values.reshape(x, 2, y, 2, z, 2), axis=(1, 3, 5))
 
 
 def _window(region: Region, margin: int) -> tuple[slice, slice, slice]:
