@@ -304,8 +304,8 @@ class Config:
 
 
 PRESETS = {
-    "paper": Config(preset="paper", surface=SurfaceConfig(level=0.5), hypotheses=None),
     "default": Config(preset="default"),
+    "paper": Config(preset="paper", surface=SurfaceConfig(level=0.5), hypotheses=None),
 }
 
 
@@ -326,11 +326,12 @@ def _vprism_observation() -> ObservationConfig:
 class PointSDFConfig:
     """The PointSDF baseline: what is asked of a trained network.
 
-    level : occupancy at the surface, the paper's; half_width : of the box around the middle of what
-    was seen outside of which occupancy is 0
+    surface : its level is the paper's; observation : only what finds the support plane
+    half_width : of the box around the middle of what was seen outside of which occupancy is 0
     """
 
-    level: float = 0.3
+    surface: SurfaceConfig = SurfaceConfig(level=0.3)
+    observation: ObservationConfig = field(default_factory=ObservationConfig)
     min_points: int = 16
     half_width: float = 0.2
 
@@ -345,6 +346,7 @@ class VPrismConfig:
     """
 
     observation: ObservationConfig = field(default_factory=_vprism_observation)
+    surface: SurfaceConfig = SurfaceConfig(level=0.5)
     hinge_spacing: float = 0.05
     hinge_radius: float = 0.15
     surface_hinges: int = 32

@@ -88,7 +88,7 @@ def write_report(
     for region, title in (("near", "all points near the objects"), ("occluded", "occluded points")):
         columns = [(head, name.format(region), f, d) for head, name, f, d in PROBABILITIES]
         parts += [f"## Probabilities, {title}", _figures_table(summaries, labels, columns)]
-    with_prior = [s for s in summaries if s.variant.preset is not None]
+    with_prior = [s for s in summaries if s.variant.retriever is not None]
     if with_prior:
         parts += ["## Retrieval and registration", _figures_table(with_prior, labels, PLACEMENT)]
         parts += ["Objects of the prior, by visible pixels:", _hits_table(with_prior, labels)]

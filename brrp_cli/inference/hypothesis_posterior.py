@@ -3,15 +3,21 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Protocol
+from typing import TYPE_CHECKING, ClassVar, Protocol
 
 import numpy as np
 import torch
 from numpy.typing import NDArray
 
+from brrp_cli.inference.mean_grid import MeanGrid
 from brrp_cli.inference.placed_shape import PlacedShape
 from brrp_cli.inference.posterior import HilbertPosterior
 from brrp_cli.reconstruction import METRES, Axes
+
+if TYPE_CHECKING:
+    import h5py
+
+    from brrp_cli.hdf5 import SharedParts
 
 # Standard deviation of the logistic distribution over 4: a surface whose occupancy is a logistic
 # function of the way across it has this over the gradient as standard deviation of its place.
@@ -23,7 +29,12 @@ STEP = 0.001
 
 
 class MeanFunction(Protocol):
-    """What a hypothesis says before the observation corrects it: a logit of occupancy m(x)."""
+    """What a hypothesis says before the observation corrects it: a logit of occupancy m(x).
+
+    kind : what a file calls the class
+    """
+
+    kind: ClassVar[str]
 
     @property
     def bounds(self) -> NDArray[np.float64]:
@@ -35,6 +46,9 @@ class MeanFunction(Protocol):
     def volume(self, axes: Axes) -> NDArray[np.float32]:
         """m (nx, ny, nz) on a grid of camera-frame coordinates, metres."""
 
+    def write(self, group: h5py.Group, shared: SharedParts) -> None:
+        """Into a group of its own."""
+
 
 @dataclass(frozen=True)
 class HypothesisPosterior:
@@ -44,6 +58,8 @@ class HypothesisPosterior:
     the weight of each particle; correction : the particles' weights w; box : (2, 3) metres, camera
     frame, outside of which nothing is occupied
     """
+
+    kind: ClassVar[str] = "hypotheses"
 
     means: tuple[MeanFunction, ...]
     which: NDArray[np.int64]
@@ -127,6 +143,40 @@ class HypothesisPosterior:
             for step in np.eye(3) * STEP
         ]
         return deviation(np.linalg.norm(gradient, axis=0))
+
+    def write(self, group: h5py.Group, shared: SharedParts) -> None:
+        """The correction as its class writes it, and which (P,) int64, shares (P,) float64, box (2,
+        3), means/0, 1, ... as their classes write them, with their kind."""
+        self.correction.write(group, shared)
+        group.attrs["box"] = self.box
+        for name, values in (("which", self.which), ("shares", self.shares)):
+            group.create_dataset(name, data=values, chunks=values.shape, fletcher32=True)
+        for number, mean in enumerate(self.means):
+            part = group.create_group(f"means/{number}")
+            part.attrs["kind"] = mean.kind
+            mean.write(part, shared)
+
+    @classmethod
+    def read(cls, group: h5py.Group, shared: SharedParts) -> HypothesisPosterior:
+        """What `write` wrote. Errors: KeyError, ValueError."""
+        parts = [group[f"means/{number}"] for number in range(len(group["means"]))]
+        means = tuple(_KINDS[part.attrs["kind"]].read(part, shared) for part in parts)
+        which = np.asarray(group["which"], dtype=np.int64)
+        shares = np.asarray(group["shares"], dtype=np.float64)
+        if not len(which) or which.min() < 0 or which.max() >= len(means):
+            raise ValueError(f"particles of hypotheses that are not there: {which.tolist()}")
+        return HypothesisPosterior(
+            means,
+            which,
+            shares,
+            HilbertPosterior.read(group, shared),
+            np.asarray(group.attrs["box"], dtype=np.float64),
+        )
+
+
+_KINDS: dict[str, type[MeanGrid] | type[PlacedShape]] = {
+    each.kind: each for each in (MeanGrid, PlacedShape)
+}
 
 
 def deviation(steepness: NDArray[np.floating]) -> NDArray[np.float32]:

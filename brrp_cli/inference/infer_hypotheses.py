@@ -5,7 +5,8 @@
 
 y_i is the probability that x_i is occupied, given what the sensor measured and how far it errs: a
 sample within the sensor's noise of the surface says little. Each hypothesis has the weight that
-verification gave it, whatever number of particles describes it.
+verification gave it, whatever number of particles describes it, and a posterior of its own over w:
+SVGD runs for its particles by themselves.
 """
 
 from __future__ import annotations
@@ -21,8 +22,9 @@ from brrp_cli.config import FittedMapConfig
 from brrp_cli.inference.density import logistic_score
 from brrp_cli.inference.hinge import HingeGrid, factors
 from brrp_cli.inference.hypothesis_posterior import HypothesisPosterior, MeanFunction
+from brrp_cli.inference.placed_shape import PlacedShape
 from brrp_cli.inference.posterior import HilbertPosterior
-from brrp_cli.inference.svgd import run_svgd
+from brrp_cli.inference.svgd import groups_of, run_svgd
 from brrp_cli.seeds import child_seed
 
 Array = NDArray[np.float64]
@@ -30,10 +32,13 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class SoftSamples:
-    """points : (n, 3), metres, camera frame; targets : (n,) probability of being occupied."""
+    """points : (n, 3), metres, camera frame; targets : (n,) probability of being occupied;
+    measured : (n, 3), the point of the seen surface that a sample comes from, NaN for free
+    space."""
 
     points: Array
     targets: Array
+    measured: Array
 
 
 @dataclass(frozen=True)
@@ -41,7 +46,8 @@ class Problem:
     """What is to be inferred.
 
     observed : samples near the object; means : of C hypotheses; weights : (C,), sum 1, of the
-    hypotheses; stiffness : (C,) factors of lambda_norm; box : (2, 3), metres, camera frame, what
+    hypotheses; stiffness : (C,) factors of lambda_norm; noise : metres, a placed shape whose
+    surface lies so near to a measured point explains it; box : (2, 3), metres, camera frame, what
     was seen and the hypotheses' shapes
     """
 
@@ -49,6 +55,7 @@ class Problem:
     means: tuple[MeanFunction, ...]
     weights: Array
     stiffness: Array
+    noise: float
     box: Array
 
 
@@ -65,6 +72,10 @@ def infer_correction(
     targets = torch.from_numpy(samples.targets.astype(np.float32)).to(device)
     means = np.stack([mean.logits(samples.points) for mean in problem.means])[which]
     mean = torch.from_numpy(means).to(device)
+    counted = torch.from_numpy(
+        np.stack([_counted(m, samples, problem.noise) for m in problem.means])
+    )
+    counted = counted.to(device)[torch.from_numpy(which).to(device)]
     stiffness = torch.from_numpy(problem.stiffness[which].astype(np.float32)).to(device)[:, None]
     generator = torch.Generator().manual_seed(child_seed(seed, "correction"))
 
@@ -74,16 +85,34 @@ def infer_correction(
             return norm
         rows = torch.randint(len(targets), (config.batch,), generator=generator).to(device)
         return norm - config.lambda_observed * logistic_score(
-            weights, phi.rows(rows), targets[rows], mean[:, rows]
+            weights, phi.rows(rows), targets[rows], mean[:, rows], counted[:, rows]
         )
 
     start = config.start * torch.randn(len(which), grid.dimension, generator=generator)
     start[:, 0] = 0
     start = start.to(device) / stiffness.sqrt()
-    weights = run_svgd(start, score, steps=config.steps, learning_rate=config.learning_rate)
+    weights = run_svgd(
+        start,
+        score,
+        steps=config.steps,
+        learning_rate=config.learning_rate,
+        groups=groups_of(torch.from_numpy(which).to(device)),
+    )
     reach = float((problem.box[1] - problem.box[0]).max() / 2)
     correction = HilbertPosterior(weights.cpu().numpy(), center, grid, reach)
     return HypothesisPosterior(problem.means, which, shares, correction, problem.box)
+
+
+def _counted(mean: MeanFunction, samples: SoftSamples, noise: float) -> NDArray[np.float32]:
+    """1 for each sample (n,) that has a say, 0 for those of the seen surface that a placed shape
+    explains to within the noise: the placement has been fitted to them, and behind a thin wall they
+    would be taken for its inside."""
+    counted = np.ones(len(samples.points), np.float32)
+    seen = np.flatnonzero(np.isfinite(samples.measured[:, 0]))
+    if isinstance(mean, PlacedShape) and len(seen):
+        distance = mean.signed_distance(samples.measured[seen], noise)
+        counted[seen] = np.abs(distance) > noise
+    return counted
 
 
 def particles_of(weights: Array, particles: int) -> tuple[NDArray[np.int64], Array]:
@@ -116,4 +145,4 @@ def _inside(samples: SoftSamples, box: Array, margin: float) -> SoftSamples:
     """The samples that hinge points can reach."""
     points = samples.points
     kept = ((points > box[0] - margin) & (points < box[1] + margin)).all(axis=1)
-    return SoftSamples(points[kept], samples.targets[kept])
+    return SoftSamples(points[kept], samples.targets[kept], samples.measured[kept])

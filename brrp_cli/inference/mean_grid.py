@@ -3,12 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import map_coordinates
 
+from brrp_cli.hdf5 import write_compressed
 from brrp_cli.reconstruction import Axes
+
+if TYPE_CHECKING:
+    import h5py
+
+    from brrp_cli.hdf5 import SharedParts
 
 Array = NDArray[np.float64]
 
@@ -19,6 +26,8 @@ class MeanGrid:
 
     lower : (3,); spacing : > 0; values : (nx, ny, nz) float16; outside : logit off the grid
     """
+
+    kind: ClassVar[str] = "grid"
 
     lower: Array
     spacing: float
@@ -41,6 +50,21 @@ class MeanGrid:
         """m (nx, ny, nz) on a grid along the camera's axes, metres."""
         nodes = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
         return self.logits(nodes.reshape(-1, 3)).reshape(nodes.shape[:3])
+
+    def write(self, group: h5py.Group, shared: SharedParts) -> None:
+        """Attributes lower (3), spacing, outside; values (nx, ny, nz) float16."""
+        group.attrs.update({"lower": self.lower, "spacing": self.spacing, "outside": self.outside})
+        write_compressed(group, "values", self.values)
+
+    @classmethod
+    def read(cls, group: h5py.Group, shared: SharedParts) -> MeanGrid:
+        """What `write` wrote. Errors: KeyError, ValueError."""
+        return MeanGrid(
+            lower=np.asarray(group.attrs["lower"], dtype=np.float64),
+            spacing=float(group.attrs["spacing"]),
+            values=np.asarray(group["values"], dtype=np.float16),
+            outside=float(group.attrs["outside"]),
+        )
 
 
 def grid_over(box: Array, nodes: int) -> tuple[Array, float, Array]:

@@ -7,13 +7,21 @@ evaluated in the model's own frame: exact within the band where the logit is not
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from brrp_cli.geometry import transform_points
+from brrp_cli.hdf5 import write_compressed
+from brrp_cli.prior.distance_field import DistanceField
 from brrp_cli.prior.shape import StoredShape
 from brrp_cli.reconstruction import Axes
+
+if TYPE_CHECKING:
+    import h5py
+
+    from brrp_cli.hdf5 import SharedParts
 
 Array = NDArray[np.float64]
 
@@ -25,6 +33,8 @@ class PlacedShape:
     T_cam_shape : (4, 4) similarity from the shape's coordinates; width : metres, scale of the
     logistic function across the surface; limit : of the logit
     """
+
+    kind: ClassVar[str] = "shape"
 
     name: str
     shape: StoredShape
@@ -69,3 +79,43 @@ class PlacedShape:
         """m (nx, ny, nz) on a grid of camera-frame coordinates, metres."""
         nodes = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
         return self.logits(nodes.reshape(-1, 3)).reshape(nodes.shape[:3])
+
+    def write(self, group: h5py.Group, shared: SharedParts) -> None:
+        """Attributes name, T_cam_shape (4, 4), width, limit, and shape, the name of the stored
+        shape among what the file's objects share."""
+        group.attrs.update({"name": self.name, "T_cam_shape": self.T_cam_shape})
+        group.attrs.update({"width": self.width, "limit": self.limit})
+        group.attrs["shape"] = shared.write("shape", self.shape, _write_shape)
+
+    @classmethod
+    def read(cls, group: h5py.Group, shared: SharedParts) -> PlacedShape:
+        """What `write` wrote. Errors: KeyError, ValueError."""
+        return PlacedShape(
+            str(group.attrs["name"]),
+            shared.read(str(group.attrs["shape"]), _read_shape),
+            np.asarray(group.attrs["T_cam_shape"], dtype=np.float64),
+            float(group.attrs["width"]),
+            float(group.attrs["limit"]),
+        )
+
+
+def _write_shape(group: h5py.Group, shape: StoredShape) -> None:
+    """Attributes lower (3) and spacing of the field; vertices (n, 3) float32, faces (m, 3) int32,
+    colours (n, 3) uint8, field (nx, ny, nz) float16."""
+    group.attrs.update({"lower": shape.field.lower, "spacing": shape.field.spacing})
+    for key in ("vertices", "faces", "colours"):
+        write_compressed(group, key, getattr(shape, key))
+    write_compressed(group, "field", shape.field.values.astype(np.float16))
+
+
+def _read_shape(group: h5py.Group) -> StoredShape:
+    vertices = np.asarray(group["vertices"], dtype=np.float32)
+    faces = np.asarray(group["faces"], dtype=np.int32)
+    if not len(faces) or faces.min() < 0 or faces.max() >= len(vertices):
+        raise ValueError("a mesh whose faces have corners that it lacks")
+    field = DistanceField(
+        np.asarray(group.attrs["lower"], dtype=np.float64),
+        float(group.attrs["spacing"]),
+        np.asarray(group["field"], dtype=np.float32),
+    )
+    return StoredShape(vertices, faces, np.asarray(group["colours"], dtype=np.uint8), field)

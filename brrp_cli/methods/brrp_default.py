@@ -16,7 +16,7 @@ from brrp_cli.inference.infer_hypotheses import Problem, SoftSamples, infer_corr
 from brrp_cli.inference.mean_grid import MeanGrid, grid_over
 from brrp_cli.inference.placed_shape import PlacedShape
 from brrp_cli.observation.ray_samples import ObjectObservation
-from brrp_cli.observation.soft_samples import soft_samples
+from brrp_cli.observation.soft_samples import depth_deviation, soft_samples
 from brrp_cli.observation.support_plane import Plane
 from brrp_cli.prior.store import Prior
 from brrp_cli.reconstruction import OK, ObjectReconstruction, Retrieved
@@ -150,9 +150,12 @@ def _infer(
         means.append(_completed(part, box, frame, observation.object_id, plane, config.mean))
     stiffness = np.ones(len(means))
     stiffness[: len(shapes)] = config.map.stiffness
-    points, targets = soft_samples(observation, frame, config.map.behind, config.sensor)
+    points, targets, measured = soft_samples(observation, frame, config.map.behind, config.sensor)
+    noise = config.sensor.sure * depth_deviation(observation.center[2:], config.sensor)[0]
     return infer_correction(
-        Problem(SoftSamples(points, targets), tuple(means), weights, stiffness, box),
+        Problem(
+            SoftSamples(points, targets, measured), tuple(means), weights, stiffness, noise, box
+        ),
         config.map,
         seed=child_seed(seed, observation.object_id),
         device=device,

@@ -12,8 +12,7 @@ from brrp_cli.prior.store import Prior
 
 
 def check_prior(prior: Prior, config: Config) -> None:
-    """PriorError unless the prior's clouds and features were made as `config` makes them, and
-    distances are there if it asks for them."""
+    """PriorError unless the prior's clouds and features were made as `config` makes them."""
     # As JSON gives it back: tuples are lists.
     wanted = json.loads(json.dumps(asdict(config.features)))
     features = prior.parameters.get("features")

@@ -21,8 +21,9 @@ def depth_deviation(depth: NDArray[np.floating], config: SensorConfig) -> Array:
 
 def soft_samples(
     observation: ObjectObservation, frame: Frame, distance: float, config: SensorConfig
-) -> tuple[Array, Array]:
-    """Points (n, 3), metres, camera frame, and the probability (n,) that each is in the object.
+) -> tuple[Array, Array, Array]:
+    """Points (n, 3), metres, camera frame, the probability (n,) that each is in the object, and the
+    point of the seen surface (n, 3) that it comes from, NaN for free space.
 
     The seen surface is asked `distance` metres in front of and behind of where it was measured: the
     measurement itself is as much outside as inside. A free sample that lies a few standard
@@ -42,6 +43,7 @@ def soft_samples(
     return (
         np.concatenate([_along(seen, distance), _along(seen, -distance), free]),
         np.concatenate([sure, 1 - sure, np.zeros(len(free))]),
+        np.concatenate([seen, seen, np.full_like(free, np.nan)]),
     )
 
 

@@ -20,7 +20,7 @@ from brrp_cli.prior.shard import APPEARANCE, ARRAYS, DISTANCES, MESH, StoredObje
 def pack(item: PriorObject, input_sha256: str) -> StoredObject:
     """As it is stored: clouds joined, features and their normals in half precision."""
     clouds = list(item.clouds.values())
-    arrays = {
+    arrays: dict[str, NDArray[Any]] = {
         "box": np.stack([item.center - _half(item), item.center + _half(item)]),
         "samples": item.samples,
         "labels": item.labels,
@@ -76,8 +76,10 @@ def unpack(stored: StoredObject, description: str) -> PriorObject:
             for T, p in zip(arrays["pose_T"], arrays["pose_probability"], strict=True)
         ],
         record=stored.record,
-        appearance=unpack_appearance(stored.arrays),
-        shape=_unpack_shape(stored.arrays),
+        appearance=Appearance(
+            **{f.name: arrays[f"{APPEARANCE}/{f.name}"] for f in fields(Appearance)}
+        ),
+        shape=_unpack_shape(arrays),
     )
 
 
@@ -93,8 +95,3 @@ def _unpack_shape(arrays: dict[str, NDArray[Any]]) -> StoredShape:
         colours=arrays[f"{MESH}/colours"],
         field=field,
     )
-
-
-def unpack_appearance(arrays: dict[str, NDArray[Any]]) -> Appearance:
-    """The descriptors among a shard's arrays."""
-    return Appearance(**{f.name: arrays[f"{APPEARANCE}/{f.name}"] for f in fields(Appearance)})
