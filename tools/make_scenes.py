@@ -38,6 +38,7 @@ from tqdm import tqdm
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from tabletop.check import MIN_PIXELS, Distance, check_scene
+from tabletop.held_out import LEAVE, MIXED, TAKE, chosen
 from tabletop.models import find_meshes
 from tabletop.scene import LIGHTS, LIMITS, Plan, make_scene
 
@@ -63,6 +64,13 @@ def _size(_context: click.Context, _option: click.Parameter, value: str) -> tupl
 @click.option("--only", default="", callback=_prefixes, help="Names to take, as in 030,065-b.")
 @click.option("--skip", default="", callback=_prefixes, help="Names to leave out.")
 @click.option(
+    "--held-out",
+    default=MIXED,
+    show_default=True,
+    type=click.Choice([MIXED, LEAVE, TAKE]),
+    help="What to do with the names of data_manifests/household_held_out.toml.",
+)
+@click.option(
     "--data-root",
     type=click.Path(path_type=Path),
     help="Mesh paths are relative to it [MESHES/..].",
@@ -81,6 +89,7 @@ def main(
     meshes: Path | None,
     only: tuple[str, ...],
     skip: tuple[str, ...],
+    held_out: str,
     data_root: Path | None,
     scenes: int,
     views: int,
@@ -106,7 +115,8 @@ def main(
         if meshes is None:
             raise click.UsageError("--meshes is needed to make scenes")
         import_library("pybullet")
-        found = tuple(path.absolute() for path in find_meshes(meshes, only, skip))
+        paths = chosen(find_meshes(meshes, only, skip), held_out)
+        found = tuple(path.absolute() for path in paths)
         if not found[0].is_relative_to(data_root):
             raise click.UsageError(f"{meshes} does not lie below --data-root {data_root}")
         plan = Plan(found, data_root, output, seed, views, noise, size, overwrite, light)
