@@ -100,7 +100,9 @@ def main(
     """Make tabletop scenes of MESHES in OUTPUT, and check a fifth of them."""
     try:
         if noise != "none" and sensor != "none":
-            raise click.UsageError("--noise and --sensor exclude each other: a sensor brings its own")
+            raise click.UsageError(
+                "--noise and --sensor exclude each other: a sensor brings its own"
+            )
         if data_root is None:
             if meshes is None:
                 raise click.UsageError("name the meshes: --meshes, or --data-root with --check")

@@ -103,15 +103,16 @@ def real_frames(folder: Path) -> Iterator[tuple[str, Frame]]:
         rgb = np.asarray(Image.open(path.parent / "color.png").convert("RGB"))
         depth = np.asarray(Image.open(path)).astype(np.uint16)
         frame = make_frame(rgb, None, depth=depth, K=K, source=path.parent)
-        yield path.parent.name, make_frame(
-            rgb, segment(frame), depth=depth, K=K, source=path.parent
+        yield (
+            path.parent.name,
+            make_frame(rgb, segment(frame), depth=depth, K=K, source=path.parent),
         )
 
 
 def made_frames(scenes: Path) -> Iterator[Frame]:
     """Every view of a set."""
     for scene in find_scenes(scenes):
-        for view in range(len(list(scene.folder.glob("[0-9]*/depth.npy")))):
+        for view in range(len(scene.views)):
             yield scene.view(view)
 
 

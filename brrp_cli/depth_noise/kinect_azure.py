@@ -65,7 +65,9 @@ def kinect_azure_depth(view: View, rng: np.random.Generator) -> NDArray[np.float
 def _through_the_lens(light: NDArray[np.complexfloating]) -> NDArray[np.complex128]:
     ndimage = import_library("scipy.ndimage")
     sharp = ndimage.gaussian_filter(light, BLUR)
-    return np.asarray((1 - SCATTER) * sharp + SCATTER * ndimage.gaussian_filter(light, SCATTER_WIDTH))
+    return np.asarray(
+        (1 - SCATTER) * sharp + SCATTER * ndimage.gaussian_filter(light, SCATTER_WIDTH)
+    )
 
 
 def _noise(shape: tuple[int, int], rng: np.random.Generator) -> NDArray[np.float64]:

@@ -58,7 +58,7 @@ def bounced_light(view: View, half_wave: float) -> NDArray[np.complex128]:
     spread = _spread(turned.reshape(len(rows), len(columns)), seen, (height, width))
     reflected = view.albedo * (1 - view.gloss) / np.maximum(view.depth * view.stretch, 0.1) ** 2
     own = np.exp(2j * np.pi * view.depth * view.stretch / half_wave)
-    return np.where(view.depth > 0, spread * reflected * own, 0.0)
+    return np.asarray(np.where(view.depth > 0, spread * reflected * own, 0), dtype=np.complex128)
 
 
 def _spread(
@@ -75,4 +75,4 @@ def _spread(
         return np.asarray(ndimage.map_coordinates(image, grid, order=1, mode="nearest"))
 
     weight = np.maximum(sample(known), 1e-6)
-    return (sample(values.real) + 1j * sample(values.imag)) / weight
+    return np.asarray((sample(values.real) + 1j * sample(values.imag)) / weight)

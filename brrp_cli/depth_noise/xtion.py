@@ -33,7 +33,7 @@ SINGLE = 0.02
 BLOCKS, BLOCK_LENGTH = 0.075, 3.0
 WAVES, WAVE_LENGTH = 0.085, 40.0
 # Silhouettes, pixels: raggedness and its length, how far the near side bleeds over, the rim.
-RAGGED, RAGGED_LENGTH, BLEED, RIM = 1.0, 2.5, 1, 1
+RAGGED, RAGGED_LENGTH, BLEED, RIM = 1.5, 2.5, 1, 1
 EDGE = 1.5  # pixels of disparity that are an edge
 # Signal (`View.signal`) under which nothing is matched, and its spread between patches, in log.
 FAINT, FAINT_SPREAD, FAINT_LENGTH = 0.06, 0.5, 2.0

@@ -13,10 +13,10 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from tabletop.stage import Stage, pixel_rays
 
 from brrp_cli.dependencies import import_library
 from brrp_cli.depth_noise.waves import waves
+from tabletop.stage import Stage, pixel_rays
 
 BASELINE = 0.055  # metres, left to right imager
 COLOUR_TO_LEFT = 0.015  # metres, the left imager to the right of the colour camera
@@ -42,7 +42,7 @@ class InfraredPair:
 
 
 def infrared_pair(stage: Stage, rng: np.random.Generator) -> InfraredPair:
-    """Both infrared images of a stage, with the noise of their sensors and imperfect calibration."""
+    """Both infrared images of a stage, with their noise and an imperfect calibration."""
     rays = pixel_rays(stage.K, stage.shape, SAMPLES)
     left = _picture(stage, COLOUR_TO_LEFT, rays)
     error = DISTORTION * waves(stage.shape, DISTORTION_LENGTH, rng)

@@ -49,7 +49,7 @@ def check_scene(
 
     Errors: SceneError if a mask holds an id that objects.json lacks, or if an object's pixels lie
     further from its mesh than `limits` (median, 95th percentile), metres. Objects with fewer than
-    `min_pixels` pixels are not judged.
+    `min_pixels` pixels are measured and not judged.
     """
     objects = {o.id: o for o in read_objects(folder / "objects.json")}
     surfaces: dict[int, Any] = {}
@@ -65,14 +65,14 @@ def check_scene(
                     found=object_id,
                 )
             seen = points[(ids == object_id) & np.isfinite(points).all(axis=-1)]
-            if len(seen) < min_pixels:
+            if len(seen) < MIN_PIXELS:
                 continue
             if object_id not in surfaces:
                 surfaces[object_id] = _surface(true_mesh(objects[object_id], data_root))
             distance = _distances(surfaces[object_id], seen[:: -(-len(seen) // MAX_PIXELS)])
             median, high = np.percentile(distance, [50, 95])
             distances.append(Distance(view, object_id, len(seen), float(median), float(high)))
-            if median > limits[0] or high > limits[1]:
+            if len(seen) >= min_pixels and (median > limits[0] or high > limits[1]):
                 raise SceneError(
                     "Pixels do not lie on the posed mesh",
                     where=f"{view}, object {object_id} ({objects[object_id].mesh_path})",

@@ -155,7 +155,9 @@ def silhouettes(residual: NDArray[np.float64]) -> Silhouettes:
         rows, columns = np.unravel_index(sides[side][:, 2].astype(np.int64), (height, width))
         edges.append(np.stack([rows, columns, np.full(len(rows), side == "top")], axis=1))
     every = np.concatenate(list(sides.values()))
-    means = {side: float(found[:, 1].mean()) if len(found) else np.nan for side, found in sides.items()}
+    means = {
+        side: float(found[:, 1].mean()) if len(found) else np.nan for side, found in sides.items()
+    }
     return Silhouettes(
         flying=float(every[:, 0].mean()) if len(every) else float("nan"),
         holes_left=means["left"],

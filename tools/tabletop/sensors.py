@@ -7,12 +7,12 @@ from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
-from tabletop.stage import Stage
-from tabletop.stereo_matching import stereo_depth
 
 from brrp_cli.depth_noise.align import align_depth
 from brrp_cli.depth_noise.millimetres import whole_millimetres
 from brrp_cli.depth_noise.registry import VIEW_SENSORS, ViewSensor
+from tabletop.stage import Stage
+from tabletop.stereo_matching import stereo_depth
 
 # From a stage and random numbers to depth (H, W), metres, whole millimetres, 0 = no return.
 Sensor = Callable[[Stage, np.random.Generator], NDArray[np.float64]]

@@ -6,21 +6,21 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from tabletop.active_stereo import BASELINE, COLOUR_TO_LEFT, InfraredPair, infrared_pair
-from tabletop.stage import Stage
 
 from brrp_cli.dependencies import import_library
 from brrp_cli.depth_noise.align import align_depth
 from brrp_cli.depth_noise.millimetres import whole_millimetres
+from tabletop.active_stereo import BASELINE, COLOUR_TO_LEFT, InfraredPair, infrared_pair
+from tabletop.stage import Stage
 
 NEAREST = 0.28  # metres: sets the range of disparities that is searched
 BLOCK = 7  # pixels: side of the window that is matched
 # Penalties of neighbours one step and more apart, per pixel of a window. OpenCV's usual 8 and 32
 # make terraces of a tilted table.
 SMALL_STEP, LARGE_STEP = 2, 16
-UNIQUENESS = 8  # per cent by which the best match has to beat the second
+UNIQUENESS = 10  # per cent by which the best match has to beat the second
 LEFT_RIGHT = 1  # pixels by which matching from the right may differ
-CONTRAST = 2.5  # grey levels: standard deviation within a window that can be matched
+CONTRAST = 3.5  # grey levels: standard deviation within a window that can be matched
 SPECKLE_PIXELS, SPECKLE_RANGE = 120, 2
 SUBPIXEL = 32  # steps of disparity a pixel that the camera reports; OpenCV's matcher has 16
 MEDIAN = 5  # pixels
@@ -76,8 +76,10 @@ def _contrast(image: NDArray[np.uint8]) -> NDArray[np.float64]:
 
 
 def smooth_disparity(disparity: NDArray[np.float64]) -> NDArray[np.float64]:
-    """A median, then librealsense's edge-preserving spatial filter, on disparity (H, W), 0 = none: recursive, along
-    rows and columns, forth and back (Gastal & Oliveira, "Domain transform", SIGGRAPH 2011).
+    """Disparity (H, W), 0 = none, through a median and librealsense's spatial filter.
+
+    The latter is recursive, along rows and columns, forth and back, and stops at edges (Gastal &
+    Oliveira, "Domain transform", SIGGRAPH 2011).
     """
     cv2: Any = import_library("cv2")
     smooth = cv2.medianBlur(disparity.astype(np.float32), MEDIAN).astype(np.float64)
