@@ -1,8 +1,8 @@
 """Draw depth images of real and made frames side by side, for docs/sensors.md.
 
-    python tools/draw_sensors.py --real FOLDER/sugar_box --made stereo=SCENES/00000000/0000 ... -o PNG
+    python tools/draw_sensors.py RealSense=REAL/sugar_box stereo=SCENES/00000000/0000 ... -o PNG
 
-A row for each: colour, depth, and what depth deviates from the table's plane (red nearer than the
+Each frame is a real one (color.png, depth.png) or a view of a made scene. A row for each: colour, depth, and what depth deviates from the table's plane (red nearer than the
 plane, blue farther, full colour at 8 mm, grey for what stands on it). Black has no return.
 """
 
@@ -55,16 +55,17 @@ def row(frame: Frame, name: str) -> NDArray[np.uint8]:
 def main() -> None:
     """Write the picture."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--real", action="append", default=[], type=Path)
-    parser.add_argument("--made", action="append", default=[], metavar="SENSOR=VIEW")
+    parser.add_argument("frames", nargs="+", metavar="NAME=FOLDER")
     parser.add_argument("-o", "--output", type=Path, required=True)
     options = parser.parse_args()
-    rows = [row(read_real(folder), f"real: {folder.name}") for folder in options.real]
-    for text in options.made:
-        name, _, folder = text.partition("=")
-        rows.append(row(read_published(Path(folder)), f"made: {name}"))
+    rows = []
+    for text in options.frames:
+        name, _, folder = text.rpartition("=")
+        real = (Path(folder) / "color.png").exists()
+        rows.append(row(read_real(Path(folder)) if real else read_published(folder), name))
     picture = Image.fromarray(np.vstack(rows))
-    picture.quantize(128, dither=Image.Dither.NONE).save(options.output, optimize=True)
+    # A palette keeps the file small.
+    picture.quantize(256, dither=Image.Dither.NONE).save(options.output, optimize=True)
     print(options.output)
 
 

@@ -23,6 +23,7 @@ import argparse
 import json
 import sys
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -91,22 +92,24 @@ def statistics(frame: Frame) -> dict[str, float]:
     return dict(zip(COLUMNS, map(float, values), strict=True))
 
 
-def real_frames(folder: Path) -> Iterator[tuple[str, Frame]]:
+def real_frames(folder: Path) -> Iterator[Frame]:
     """Each frame of the folder, with masks by `segment`."""
-    shared = folder / "camera_params.json"
     for path in sorted(folder.glob("*/depth.png")):
-        own = path.parent / "intrinsics.json"
-        numbers = json.loads((own if own.exists() else shared).read_text())
-        cx = numbers.get("cx", numbers.get("x_offset"))
-        cy = numbers.get("cy", numbers.get("y_offset"))
-        K = np.array([[numbers["fx"], 0, cx], [0, numbers["fy"], cy], [0, 0, 1]])
-        rgb = np.asarray(Image.open(path.parent / "color.png").convert("RGB"))
-        depth = np.asarray(Image.open(path)).astype(np.uint16)
-        frame = make_frame(rgb, None, depth=depth, K=K, source=path.parent)
-        yield (
-            path.parent.name,
-            make_frame(rgb, segment(frame), depth=depth, K=K, source=path.parent),
-        )
+        frame = read_real(path.parent)
+        yield replace(frame, segmap=segment(frame))
+
+
+def read_real(folder: Path) -> Frame:
+    """One real frame, without masks."""
+    own = folder / "intrinsics.json"
+    shared = folder.parent / "camera_params.json"
+    numbers = json.loads((own if own.exists() else shared).read_text())
+    cx = numbers.get("cx", numbers.get("x_offset"))
+    cy = numbers.get("cy", numbers.get("y_offset"))
+    K = np.array([[numbers["fx"], 0, cx], [0, numbers["fy"], cy], [0, 0, 1]])
+    rgb = np.asarray(Image.open(folder / "color.png").convert("RGB"))
+    depth = np.asarray(Image.open(folder / "depth.png")).astype(np.uint16)
+    return make_frame(rgb, None, depth=depth, K=K, source=folder)
 
 
 def made_frames(scenes: Path) -> Iterator[Frame]:
@@ -148,9 +151,11 @@ def main() -> None:
         print("| --- |" + " --- |" * len(COLUMNS))
     try:
         if options.real:
-            for name, frame in real_frames(options.real):
+            for frame in real_frames(options.real):
                 row = statistics(frame)
-                _print(name, [_text(row[c]) for c in COLUMNS], options.markdown)
+                _print(
+                    Path(str(frame.source)).name, [_text(row[c]) for c in COLUMNS], options.markdown
+                )
         for text in options.made:
             name, _, folder = text.partition("=")
             rows = []

@@ -1,4 +1,5 @@
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -84,6 +85,18 @@ def test_a_wall_waves_as_much_as_a_real_one():
     # 400 pixels of focal length, where the real cameras have 615.
     assert 1.2 < 1e3 * waves * 400 / 615 < 2.8
     assert 1e3 * fine * 400 / 615 < 1.1
+
+
+def test_far_depth_comes_in_steps_of_a_32nd_of_a_pixel():
+    from tabletop.depth_statistics import quantisation_step
+
+    tilted = box((0, 0, 0), (6, 6, 0.1))
+    turn = trimesh.transformations.rotation_matrix(np.radians(20), [1, 0, 0])[:3, :3]
+    floor = replace(tilted, vertices=tilted.vertices @ turn.T + [0, 0, 2.2])
+    depth = stereo_depth(Stage((floor,), K, SHAPE), np.random.default_rng(0))
+    assert (depth > 0).mean() > 0.5
+    step = quantisation_step(depth, depth > 1.8)
+    assert step == pytest.approx(1 / (32 * K[0, 0] * BASELINE), rel=0.1)
 
 
 def test_disparity_is_right_to_a_tenth_of_a_pixel():

@@ -169,8 +169,8 @@ def _material(
     Most inks are thin in infrared, so that a print shows in part only.
     """
     dark, glossy = rng.random(2) < (DARK, GLOSSY)
-    base = rng.uniform(0.03, 0.1) if dark else rng.uniform(0.5, 0.9)
-    ink = rng.uniform(0.3, 1.0)
+    base = rng.uniform(0.04, 0.12) if dark else rng.uniform(0.5, 0.9)
+    ink = rng.uniform(0.0, 0.3) if dark else rng.uniform(0.3, 0.9)
     gloss = rng.uniform(0.4, 0.9) if glossy else rng.uniform(0.0, 0.2)
     return base * (1 - ink * (1 - grey)), float(gloss)
 
