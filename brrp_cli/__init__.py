@@ -12,15 +12,16 @@ from typing import TYPE_CHECKING, Any
 from brrp_cli.version import __version__
 
 if TYPE_CHECKING:
-    from brrp_cli.api import Reconstruction as Reconstruction
+    from brrp_cli.api import open_result as open_result
     from brrp_cli.api import reconstruct as reconstruct
     from brrp_cli.config import preset as preset
     from brrp_cli.errors import BrrpError as BrrpError
     from brrp_cli.frames.build import make_frame as make_frame
     from brrp_cli.frames.npz import load_frame as load_frame
     from brrp_cli.frames.readers import read_frame as read_frame
+    from brrp_cli.methods.posterior_file import open_posterior as open_posterior
     from brrp_cli.prior.store import open_prior as open_prior
-    from brrp_cli.results.posterior_file import open_posterior as open_posterior
+    from brrp_cli.reconstruction import Reconstruction as Reconstruction
     from brrp_cli.results.write import write_results as write_results
     from brrp_cli.segmentation.segment import segment as segment
     from brrp_cli.session import Reconstructor as Reconstructor
@@ -28,12 +29,13 @@ if TYPE_CHECKING:
 # Names are imported when they are used, so that `brrp --help` does not wait for torch.
 _HOMES = {
     "BrrpError": "brrp_cli.errors",
-    "Reconstruction": "brrp_cli.api",
+    "Reconstruction": "brrp_cli.reconstruction",
     "Reconstructor": "brrp_cli.session",
     "load_frame": "brrp_cli.frames.npz",
     "make_frame": "brrp_cli.frames.build",
-    "open_posterior": "brrp_cli.results.posterior_file",
+    "open_posterior": "brrp_cli.methods.posterior_file",
     "open_prior": "brrp_cli.prior.store",
+    "open_result": "brrp_cli.api",
     "preset": "brrp_cli.config",
     "read_frame": "brrp_cli.frames.readers",
     "reconstruct": "brrp_cli.api",

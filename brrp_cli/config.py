@@ -173,9 +173,10 @@ class MeanConfig:
     A placed shape is -(signed distance - growth) / width, limited to +-limit; an alignment
     score under `sure` widens it by `doubt` for each unit. An object that none explains is completed
     by a network, which is evaluated at every node where the coarse ones around are not all
-    `beyond_doubt`; its logit is `shell_logit` at least for `shell` metres behind what is seen of it. Space is empty that lies
-    more than `carve_depth` in front of the measured depth, or `carve_plane` below the plane, or
-    less than `carve_behind` behind what is no object's and more than `carve_pixels` from the mask.
+    `beyond_doubt`; its logit is `shell_logit` at least for `shell` metres behind what is seen of
+    it. Space is empty that lies more than `carve_depth` in front of the measured depth, or
+    `carve_plane` below the plane, or less than `carve_behind` behind what is no object's and more
+    than `carve_pixels` from the mask.
     """
 
     nodes: int = 200_000
@@ -262,8 +263,8 @@ class Config:
 
 
 PRESETS = {
-    "paper": Config(preset="paper", surface=SurfaceConfig(level=0.5), hypotheses=None),
     "default": Config(preset="default"),
+    "paper": Config(preset="paper", surface=SurfaceConfig(level=0.5), hypotheses=None),
 }
 
 
@@ -284,11 +285,12 @@ def _vprism_observation() -> ObservationConfig:
 class PointSDFConfig:
     """The PointSDF baseline: what is asked of a trained network.
 
-    level : occupancy at the surface, the paper's; half_width : of the box around the middle of what
-    was seen outside of which occupancy is 0
+    surface : its level is the paper's; observation : only what finds the support plane
+    half_width : of the box around the middle of what was seen outside of which occupancy is 0
     """
 
-    level: float = 0.3
+    surface: SurfaceConfig = SurfaceConfig(level=0.3)
+    observation: ObservationConfig = field(default_factory=ObservationConfig)
     min_points: int = 16
     half_width: float = 0.2
 
@@ -303,6 +305,7 @@ class VPrismConfig:
     """
 
     observation: ObservationConfig = field(default_factory=_vprism_observation)
+    surface: SurfaceConfig = SurfaceConfig(level=0.5)
     hinge_spacing: float = 0.05
     hinge_radius: float = 0.15
     surface_hinges: int = 32

@@ -7,10 +7,12 @@ file and fails again when the process ends.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, TypeVar
 
 if TYPE_CHECKING:
     import h5py
+
+T = TypeVar("T")
 
 
 def hdf5_bytes(fill: Callable[[h5py.File], None]) -> bytes:
@@ -21,3 +23,39 @@ def hdf5_bytes(fill: Callable[[h5py.File], None]) -> bytes:
         fill(file)
         file.flush()
         return bytes(file.id.get_file_image())
+
+
+class SharedParts:
+    """What several objects of one file have in common: written once, read once.
+
+    Each part is a group below `group`. An object keeps the name that `write` gave it and reads the
+    part back by that name.
+    """
+
+    def __init__(self, group: h5py.Group) -> None:
+        self._group = group
+        self._written: list[tuple[object, str]] = []
+        self._read: dict[str, Any] = {}
+
+    def write(self, name: str, part: T, fill: Callable[[h5py.Group, T], None]) -> str:
+        """Write `part` with `fill(group, part)` unless this very part was written before; returns
+        the name of its group, which is `name` for the first of that name."""
+        for known, where in self._written:
+            if known is part:
+                return where
+        taken = {where for _, where in self._written}
+        others = (f"{name}_{i}" for i in range(1, len(taken) + 1))
+        where = next(each for each in (name, *others) if each not in taken)
+        fill(self._group.create_group(where), part)
+        self._written.append((part, where))
+        return where
+
+    def read(self, name: str, read: Callable[[h5py.Group], T]) -> T:
+        """The part of that name; all objects that ask for it get the same one.
+
+        Errors: KeyError where there is none, and those of `read`.
+        """
+        if name not in self._read:
+            self._read[name] = read(self._group[name])
+        found: T = self._read[name]
+        return found

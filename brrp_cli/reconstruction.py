@@ -3,13 +3,20 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Protocol
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, ClassVar, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+from brrp_cli.frames.frame import Frame
+from brrp_cli.observation.support_plane import Plane
+
 if TYPE_CHECKING:
+    import h5py
     import trimesh
+
+    from brrp_cli.hdf5 import SharedParts
 
 Axes = tuple[NDArray[np.floating], NDArray[np.floating], NDArray[np.floating]]
 
@@ -49,6 +56,26 @@ class OccupancyPosterior(Protocol):
     def surface_uncertainty(self, vertices: NDArray[np.floating]) -> NDArray[np.float32]:
         """How unsure (n,), >= 0, the surface is at its own vertices (n, 3), where occupancy is 0.5
         everywhere; in `surface_unit`."""
+
+
+class StoredPosterior(OccupancyPosterior, Protocol):
+    """A posterior that can be kept in a file; every method's is one.
+
+    kind : what the file calls the class, so that reading finds it
+    """
+
+    kind: ClassVar[str]
+
+    def write(self, group: h5py.Group, shared: SharedParts) -> None:
+        """Write this object into its own group; the same posterior gives the same bytes.
+
+        shared : for what all objects of the frame have in common
+        """
+
+    @classmethod
+    def read(cls, group: h5py.Group, shared: SharedParts) -> StoredPosterior:
+        """What `write` wrote. Errors: KeyError, ValueError where something is missing or does not
+        fit the rest."""
 
 
 @dataclass(frozen=True)
@@ -116,6 +143,34 @@ class ObjectReconstruction:
     retrieved: list[Retrieved] = field(default_factory=list)
     unknown_probability: float = 0.0
     unknown_weight: float | None = None
-    posterior: OccupancyPosterior | None = None
+    posterior: StoredPosterior | None = None
     surface: Surface | None = None
     seconds: dict[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Reconstruction:
+    """Everything that is known of a frame's objects, and how it came about.
+
+    objects : one for each id in the mask, ascending; plane : the support plane, camera frame;
+    retriever, prior_path, prior_digest : None where the method has no prior
+    configuration : what decided the result, plain JSON
+    seconds : time of the stages that concern the whole frame.
+    """
+
+    frame: Frame
+    objects: list[ObjectReconstruction]
+    plane: Plane | None
+    method: str
+    retriever: str | None
+    prior_path: Path | None
+    prior_digest: str | None
+    configuration: dict[str, Any]
+    seed: int
+    device: str
+    seconds: dict[str, float] = field(default_factory=dict)
+
+    @property
+    def reconstructed(self) -> list[ObjectReconstruction]:
+        """The objects that have a surface."""
+        return [o for o in self.objects if o.surface is not None]

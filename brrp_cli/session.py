@@ -12,14 +12,15 @@ import time
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, cast
 
-from brrp_cli.api import Reconstruction, reconstruct
-from brrp_cli.config import Config, preset
+from brrp_cli.api import reconstruct
 from brrp_cli.errors import FrameError
 from brrp_cli.frames.frame import Frame
-from brrp_cli.methods.registry import METHODS
+from brrp_cli.methods.configuration import MethodConfig
+from brrp_cli.methods.registry import DEFAULT, reconstructing_method
 from brrp_cli.prior.store import Prior, open_prior
+from brrp_cli.reconstruction import Reconstruction
 
 if TYPE_CHECKING:
     from brrp_cli.retrieval.base import Retriever
@@ -29,7 +30,7 @@ if TYPE_CHECKING:
 class Reconstructor:
     """Reconstructs frame after frame with one prior, one retriever and one maker of masks.
 
-    prior : opened, or the path of one; None with a method that has none ("vprism")
+    prior : opened, or the path of one; None with a method that has none
     config, weights, seed, device, workers : as in `reconstruct`
     retriever : a name as `brrp reconstruct --retriever` takes it
     prompt : makes masks of what it names where a frame has none; None = of what stands on the
@@ -42,8 +43,8 @@ class Reconstructor:
         self,
         prior: Prior | str | Path | None = None,
         *,
-        method: str = "brrp",
-        config: Config | None = None,
+        method: str = DEFAULT,
+        config: MethodConfig | None = None,
         weights: str | Path | None = None,
         retriever: str = "auto",
         clip_dir: Path | None = None,
@@ -56,10 +57,11 @@ class Reconstructor:
         self._workers = workers
         self._method, self._seed, self._device, self._prompt = method, seed, device, prompt
         self._weights = weights
-        self._config = config or preset("default")
+        chosen = reconstructing_method(method)
+        self._config = cast(Any, config if config is not None else chosen.preset())
         self._prior = open_prior(Path(prior)) if isinstance(prior, (str, Path)) else prior
         self._retriever: Retriever | None = None
-        if self._prior is not None and METHODS[method].uses_prior:
+        if self._prior is not None and chosen.uses_retriever:
             from brrp_cli.retrieval.choose import choose_retriever
 
             self._retriever = choose_retriever(

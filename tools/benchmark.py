@@ -33,7 +33,6 @@ from speed.growth import cases
 from speed.machine import Machine, limits, measure_machine
 from speed.measure import cold_reconstruct, peak_megabytes, run, spread
 
-from brrp_cli.api import Reconstruction
 from brrp_cli.config import preset
 from brrp_cli.errors import BrrpError
 from brrp_cli.frames.frame import Frame
@@ -41,6 +40,7 @@ from brrp_cli.frames.npz import save_frame
 from brrp_cli.frames.readers import read_frame
 from brrp_cli.observation.ray_samples import observe
 from brrp_cli.prior.store import Prior, open_prior
+from brrp_cli.reconstruction import Reconstruction
 from brrp_cli.retrieval.choose import choose_retriever
 from brrp_cli.session import Reconstructor
 from brrp_cli.threads import cores

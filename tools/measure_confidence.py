@@ -23,14 +23,15 @@ import trimesh
 # The script also runs from a checkout that is not installed.
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from brrp_cli.api import Reconstruction, reconstruct
+from brrp_cli.api import reconstruct
 from brrp_cli.config import MeanConfig, preset
 from brrp_cli.dependencies import import_open3d
 from brrp_cli.ground_truth.metrics import sample_surface
 from brrp_cli.ground_truth.scenes import find_scenes, true_mesh_in_camera
 from brrp_cli.inference.prior_mean import empty_space
+from brrp_cli.methods.registry import METHODS
 from brrp_cli.prior.store import Prior, open_prior
-from brrp_cli.reconstruction import ObjectReconstruction
+from brrp_cli.reconstruction import ObjectReconstruction, Reconstruction
 from brrp_cli.seeds import child_rng
 from brrp_cli.surface.confidence import Empty, confidence_surface
 
@@ -46,7 +47,7 @@ def main() -> None:
     parser.add_argument("--prior", type=Path)
     parser.add_argument("--data-root", type=Path)
     parser.add_argument("--method", default="brrp")
-    parser.add_argument("--preset", default="default")
+    parser.add_argument("--preset")
     parser.add_argument("--margin", type=float, default=0.0, help="mm, into unseen space")
     parser.add_argument("--first", type=int, default=10, help="scenes")
     parser.add_argument("-o", "--output", type=Path)
@@ -68,7 +69,7 @@ def measure(arguments: argparse.Namespace) -> None:
         if scene.name in done:
             continue
         frame = scene.view(0)
-        config = preset(arguments.preset)
+        config = METHODS[arguments.method].preset(arguments.preset)
         result = reconstruct(frame, prior, method=arguments.method, config=config, device="cpu")
         rows = []
         for item in result.objects:

@@ -25,9 +25,9 @@ from typing import Any
 import numpy as np
 
 from brrp_cli import Reconstructor
-from brrp_cli.api import Reconstruction
 from brrp_cli.errors import BrrpError
 from brrp_cli.frames.ros_images import frame_of
+from brrp_cli.reconstruction import Reconstruction
 
 Triangles = tuple[np.ndarray, np.ndarray]
 

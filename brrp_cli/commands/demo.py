@@ -10,16 +10,16 @@ from typing import TYPE_CHECKING
 
 import click
 
-from brrp_cli.config import PRESETS, preset
+from brrp_cli.commands.method_options import OneOf
+from brrp_cli.methods.registry import DEFAULT, METHODS
 from brrp_cli.progress import note
 
 if TYPE_CHECKING:
     import trimesh
 
-    from brrp_cli.api import Reconstruction
     from brrp_cli.demo.scene import DemoScene
     from brrp_cli.demo.score import Score
-    from brrp_cli.reconstruction import ObjectReconstruction
+    from brrp_cli.reconstruction import ObjectReconstruction, Reconstruction
 
 SOME_FAILED = 3
 FRAME = "frame.npz"
@@ -35,10 +35,15 @@ NOT_STORED = "none of them"
     show_default=True,
 )
 @click.option("--seed", type=int, default=0, show_default=True, help="Another seed, another scene.")
-@click.option("--preset", "preset_name", type=click.Choice(list(PRESETS)), default="default")
+@click.option(
+    "--preset",
+    "preset_name",
+    type=OneOf(lambda: list(METHODS[DEFAULT].presets)),
+    help="[default: the first]",
+)
 @click.option("--device", type=click.Choice(["auto", "cpu", "cuda"]), default="auto")
 @click.option("--overwrite", is_flag=True, help="Replace the output folder if it is there.")
-def command(output: Path, seed: int, preset_name: str, device: str, overwrite: bool) -> None:
+def command(output: Path, seed: int, preset_name: str | None, device: str, overwrite: bool) -> None:
     """Run the whole path on a made scene and score it.
 
     Builds the starter prior from household shapes on first use, makes a tabletop frame of some of
@@ -66,7 +71,7 @@ def command(output: Path, seed: int, preset_name: str, device: str, overwrite: b
     prior = open_prior(starter_prior())
     note(f"Prior: {prior.path} (starter prior), {len(prior.names)} household shapes")
     scene = make_scene(seed)
-    config = preset(preset_name)
+    config = METHODS[DEFAULT].preset(preset_name)
     retriever = choose_retriever("auto", prior, config, seed)
     note(f"Scene: seed {seed}, {len(scene.truth)} objects. Retrieval: {retriever.name}")
     result = reconstruct(

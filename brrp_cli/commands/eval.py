@@ -9,10 +9,9 @@ from typing import Any
 
 import click
 
+from brrp_cli.commands.method_options import OneOf, check_weights, methods_help, weights_help
 from brrp_cli.commands.retriever_option import RetrieverName
-from brrp_cli.commands.weights_option import check_weights
-from brrp_cli.config import PRESETS
-from brrp_cli.methods.registry import METHODS
+from brrp_cli.methods.registry import COMPARED, METHODS, preset_names
 from brrp_cli.progress import note
 from brrp_cli.retrieval.choose import RETRIEVERS
 from brrp_cli.retrieval.clip.model_files import CLIP_DIR_VARIABLE
@@ -56,23 +55,22 @@ def _selection(ctx: click.Context, option: click.Parameter, value: str | None) -
     "--method",
     "methods",
     multiple=True,
-    default=["brrp,vprism"],
-    callback=_several(click.Choice(list(METHODS))),
-    help=f"Of {', '.join(METHODS)}. [default: brrp,vprism]",
+    default=[COMPARED],
+    callback=_several(OneOf(lambda: list(METHODS))),
+    help=f"{methods_help(list(METHODS))} [default: {COMPARED}]",
 )
 @click.option(
     "--weights",
     multiple=True,
     callback=_several(click.Path(path_type=Path)),
-    help="What pointsdf was trained to: files of tools/train_pointsdf.py, by name in the tables.",
+    help=f"{weights_help()} The names of the files stand for them in the tables.",
 )
 @click.option(
     "--preset",
     "presets",
     multiple=True,
-    default=["default"],
-    callback=_several(click.Choice(list(PRESETS))),
-    help=f"Of {', '.join(PRESETS)}. [default: default]",
+    callback=_several(OneOf(preset_names)),
+    help=f"Of {', '.join(preset_names())}. [default: each method's first]",
 )
 @click.option(
     "--k",
@@ -174,7 +172,7 @@ def command(
         figures = f"distance {distance.value * 1000:.2f} mm  F(5 mm) {f_score.value:.3f}"
         iou = summary.figures["iou"]
         figures += f"  IoU as published {iou.value:.3f}"
-        if summary.variant.method == "retrieval":
+        if not METHODS[summary.variant.method].gives_shapes:
             first, in_3 = summary.figures["true_first"], summary.figures["true_in_3"]
             figures = f"true object first {first.value:.3f}, among 3 {in_3.value:.3f}"
         click.echo(

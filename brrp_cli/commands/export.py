@@ -73,7 +73,7 @@ def command(
       brrp export out/ --collision hull
       brrp export out/ --confidence 0.95 -o plan/
     """
-    from brrp_cli.results.read import open_result
+    from brrp_cli.api import open_result
 
     if margin and confidence is None:
         raise click.UsageError("--margin grows the shapes of --confidence, so give both")

@@ -5,19 +5,23 @@ from __future__ import annotations
 import sys
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
-from click.core import ParameterSource
 
 from brrp_cli.commands.export import CONFIDENCE, export
 from brrp_cli.commands.frame import refuse_existing
+from brrp_cli.commands.method_options import (
+    OneOf,
+    check_options,
+    check_weights,
+    methods_help,
+    weights_help,
+)
 from brrp_cli.commands.retriever_option import RetrieverName
 from brrp_cli.commands.source_options import SourceOptions, source_options
 from brrp_cli.commands.view import PAGE, title, view
-from brrp_cli.commands.weights_option import check_weights
-from brrp_cli.config import PRESETS, preset
-from brrp_cli.methods.registry import METHODS, RECONSTRUCTING
+from brrp_cli.methods.registry import DEFAULT, METHODS, preset_names, reconstructing
 from brrp_cli.planning.options import PlanOptions
 from brrp_cli.planning.parts import HOW, check_available
 from brrp_cli.progress import note
@@ -25,16 +29,14 @@ from brrp_cli.retrieval.choose import RETRIEVERS, choose_retriever
 from brrp_cli.retrieval.clip.model_files import CLIP_DIR_VARIABLE
 
 if TYPE_CHECKING:
-    from brrp_cli.api import Reconstruction
-    from brrp_cli.config import Config
     from brrp_cli.frames.frame import Frame
+    from brrp_cli.methods.base import Method
     from brrp_cli.prior.store import Prior
+    from brrp_cli.reconstruction import Reconstruction
     from brrp_cli.retrieval.base import Retriever
 
 SOME_FAILED = 3
 NO_COLLISION = "none"
-# Options that mean nothing to a method without a prior.
-OF_A_PRIOR = ("prior_path", "preset_name", "k", "retriever", "clip_dir")
 
 
 @click.command("reconstruct")
@@ -43,17 +45,22 @@ OF_A_PRIOR = ("prior_path", "preset_name", "k", "retriever", "clip_dir")
 @click.option("-o", "--output", type=click.Path(path_type=Path), help="[default: SOURCE_METHOD/]")
 @click.option(
     "--method",
-    type=click.Choice(list(RECONSTRUCTING)),
-    default="brrp",
+    type=OneOf(reconstructing),
+    default=DEFAULT,
     show_default=True,
-    help="vprism: one map of the whole frame, without a prior. pointsdf: a trained network.",
+    help=methods_help(reconstructing()),
 )
 @click.option(
     "--weights",
     type=click.Path(path_type=Path),
-    help="What pointsdf was trained to: a file of tools/train_pointsdf.py.",
+    help=weights_help(),
 )
-@click.option("--preset", "preset_name", type=click.Choice(list(PRESETS)), default="default")
+@click.option(
+    "--preset",
+    "preset_name",
+    type=OneOf(preset_names),
+    help="A named configuration of the method. [default: its first]",
+)
 @click.option("--k", type=click.IntRange(min=1), help="Retrieved objects. [default: the preset's]")
 @click.option(
     "--retriever",
@@ -92,7 +99,7 @@ def command(
     output: Path | None,
     method: str,
     weights: Path | None,
-    preset_name: str,
+    preset_name: str | None,
     k: int | None,
     retriever: str,
     clip_dir: Path | None,
@@ -113,8 +120,8 @@ def command(
     them is written beside the output; `brrp segment OUT/frame.npz` corrects them.
 
     The prior is --prior, else BRRP_PRIOR, else the one in the user's data folder, else the
-    starter prior; --method vprism and pointsdf have none. Meshes are in metres, in the camera frame
-    unless --frame world is given.
+    starter prior, for a --method that needs one. Meshes are in metres, in the camera frame unless
+    --frame world is given.
 
     \b
     Example:
@@ -125,28 +132,24 @@ def command(
       brrp reconstruct frame.npz --method pointsdf --weights prior.safetensors
       brrp reconstruct frame.npz --collision coacd --confidence 0.95
     """
-    from brrp_cli.api import reconstruct
-    from brrp_cli.results.read import open_result
+    from brrp_cli.api import open_result, reconstruct
     from brrp_cli.results.write import check_output, write_results
 
     source.check()
     check_weights([method], [] if weights is None else [weights])
     check_collision(collision, confidence)
-    uses_prior = METHODS[method].uses_prior
-    if not uses_prior:
-        refuse_options(method, device)
+    chosen = METHODS[method]
+    check_options(chosen, preset_name, device)
     output = output or source.name.with_name(f"{source.name.name}_{method}")
     # What can be refused is refused before the work, not after it.
     frame = source.read()
     check_output(output, frame, coordinates, overwrite=overwrite)
     if source.prompt is not None or not frame.object_ids:
         frame = make_masks(source, frame, output, seed, overwrite=overwrite)
-    config = preset(preset_name)
+    config = chosen.preset(preset_name)
     config = replace(config, k=k) if k else config
-    prior, chosen = None, None
-    if uses_prior:
-        prior, chosen = open_retrieval(prior_path, config, retriever, clip_dir, seed)
-    else:
+    prior, retrieval = open_prior_of(chosen, prior_path, config, retriever, clip_dir, seed)
+    if prior is None:
         trained = "" if weights is None else f", weights {weights}"
         note(f"Method: {method}, without a prior{trained}")
     result = reconstruct(
@@ -154,7 +157,7 @@ def command(
         prior,
         method=method,
         config=config,
-        retriever=chosen,
+        retriever=retrieval,
         weights=weights,
         seed=seed,
         device=device,
@@ -206,31 +209,26 @@ def check_collision(collision: str, confidence: float | None) -> None:
     check_available(collision)
 
 
-def refuse_options(method: str, device: str) -> None:
-    """UsageError if options were typed that mean nothing to a method without a prior."""
-    context = click.get_current_context()
-    typed = [
-        option.opts[-1]
-        for option in context.command.params
-        if option.name in OF_A_PRIOR
-        and context.get_parameter_source(option.name) is ParameterSource.COMMANDLINE
-    ]
-    if typed:
-        raise click.UsageError(f"--method {method} has no prior, so leave out {', '.join(typed)}")
-    if device == "cuda" and not METHODS[method].uses_cuda:
-        raise click.UsageError(f"--method {method} runs on the CPU alone")
-
-
-def open_retrieval(
-    prior_path: Path | None, config: Config, retriever: str, clip_dir: Path | None, seed: int
-) -> tuple[Prior, Retriever]:
-    """The prior and the retriever of its objects; says which they are."""
+def open_prior_of(
+    method: Method,
+    prior_path: Path | None,
+    config: Any,
+    retriever: str,
+    clip_dir: Path | None,
+    seed: int,
+) -> tuple[Prior | None, Retriever | None]:
+    """The prior and the retriever of its objects, where the method uses them; says which they
+    are."""
+    if not method.uses_prior:
+        return None, None
     from brrp_cli.prior.default import locate_prior
     from brrp_cli.prior.store import open_prior
 
     located, how = locate_prior(prior_path)
     prior = open_prior(located)
     note(f"Prior: {located} ({how}), {len(prior.names)} objects")
+    if not method.uses_retriever:
+        return prior, None
     chosen = choose_retriever(retriever, prior, config, seed, clip_dir=clip_dir)
     note(f"Retrieval: {chosen.name}")
     return prior, chosen

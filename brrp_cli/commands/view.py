@@ -44,7 +44,7 @@ def command(results: Path, output: Path | None, open_it: bool, rerun: bool) -> N
       brrp view out/ --no-open -o page.html
       brrp view out/ --rerun
     """
-    from brrp_cli.results.read import open_result
+    from brrp_cli.api import open_result
 
     stored = open_result(results)
     if rerun:

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from brrp_cli.config import Config
 from brrp_cli.errors import BrrpError
 from brrp_cli.evaluation.memory import peak_megabytes, reset_peak
 from brrp_cli.evaluation.perturb import shift_masks, with_noise
@@ -17,7 +17,6 @@ from brrp_cli.evaluation.rows import STAGES, Row, RowLog, variant_columns
 from brrp_cli.evaluation.score_object import placement_error, score_probabilities, score_shape
 from brrp_cli.evaluation.variants import Variant
 from brrp_cli.evaluation.work import Plan, lost_row
-from brrp_cli.evaluation.written import with_surface
 from brrp_cli.frames.frame import Frame
 from brrp_cli.ground_truth.scenes import Scene
 from brrp_cli.ground_truth.surface_metrics import (
@@ -28,10 +27,11 @@ from brrp_cli.ground_truth.surface_metrics import (
 )
 from brrp_cli.ground_truth.true_meshes import close_truth
 from brrp_cli.ground_truth.true_shape import TrueShape, true_shape
-from brrp_cli.methods.registry import METHODS, Setup
+from brrp_cli.methods.base import Setup
+from brrp_cli.methods.registry import METHODS
 from brrp_cli.prior.objects import PriorObject
 from brrp_cli.prior.store import Prior, open_prior
-from brrp_cli.reconstruction import FAILED, ObjectReconstruction
+from brrp_cli.reconstruction import FAILED, ObjectReconstruction, Reconstruction
 from brrp_cli.retrieval.base import unknown
 from brrp_cli.retrieval.cached import RememberingRetriever
 from brrp_cli.seeds import child_rng
@@ -105,22 +105,44 @@ def _reconstruct(
     memory: dict[str, RememberingRetriever],
 ) -> tuple[dict[int, ObjectReconstruction] | BrrpError, float]:
     """What the method found, by id, and the peak of memory in MB."""
-    weights = None if variant.weights is None else plan.weights[variant.weights]
-    setup = Setup(variant.config, plan.seed, plan.device, weights=weights)
+    method = METHODS[variant.method]
+    prior, retriever = None, None
     reset_peak()
     try:
-        if METHODS[variant.method].uses_prior:
+        if method.uses_prior:
             assert plan.prior is not None
             prior = _prior(plan.prior)
+        if prior is not None and method.uses_retriever:
             key = _memory_key(variant)
             if key not in memory:
                 memory[key] = RememberingRetriever(_retriever(plan, scene, variant, prior))
-            setup = Setup(variant.config, plan.seed, plan.device, prior, memory[key])
-        found = METHODS[variant.method].run(frame, setup)
+            retriever = memory[key]
+        setup = Setup(
+            config=variant.config,
+            seed=plan.seed,
+            device=plan.device if method.uses_cuda else "cpu",
+            prior=prior,
+            retriever=retriever,
+            weights=None if variant.weights is None else plan.weights[variant.weights],
+            # Scenes are shared out among processes.
+            workers=1,
+        )
+        found = method.run(frame, setup)
     except BrrpError as error:
         return error, peak_megabytes()
-    written = [with_surface(item, variant) for item in found]
-    return {item.object_id: item for item in written}, peak_megabytes()
+    return _by_id(found), peak_megabytes()
+
+
+def _by_id(found: Reconstruction) -> dict[int, ObjectReconstruction]:
+    """The objects, each with its equal share of the time of stages that concern the whole frame."""
+    share = {
+        stage: found.seconds[stage] / len(found.objects)
+        for stage in STAGES
+        if stage in found.seconds and found.objects
+    }
+    return {
+        item.object_id: replace(item, seconds={**share, **item.seconds}) for item in found.objects
+    }
 
 
 def _memory_key(variant: Variant) -> str:
@@ -139,7 +161,7 @@ def _retriever(plan: Plan, scene: Scene, variant: Variant, prior: Prior) -> Retr
 
 @cache
 def _found_retriever(
-    name: str, prior: Path, config: Config, seed: int, clip_dir: Path | None
+    name: str, prior: Path, config: Any, seed: int, clip_dir: Path | None
 ) -> Retriever:
     from brrp_cli.retrieval.choose import choose_retriever
 
@@ -186,7 +208,7 @@ def _row(
     row |= {"status": item.status, "message": item.message, "points": item.n_points}
     row |= _seconds(item, memory.get(_memory_key(variant)))
     retriever = memory.get(_memory_key(variant))
-    if METHODS[variant.method].uses_prior and retriever is not None and plan.prior is not None:
+    if METHODS[variant.method].uses_retriever and retriever is not None and plan.prior is not None:
         row |= _retrieval(_prior(plan.prior).names, retriever, row["name"], item)
     if isinstance(truth, BrrpError):
         return {**row, "status": FAILED, "message": str(truth)}
@@ -196,7 +218,7 @@ def _row(
     if item.posterior is not None:
         rng = child_rng(plan.seed, "score", scene.name, object_id)
         scores, diagrams = score_probabilities(item.posterior, truth.shape)
-        level = METHODS[variant.method].level(variant.config)
+        level = variant.config.surface.level
         shape = score_shape(item.posterior, truth.shape, rng, level)
         row |= {**shape, **scores, "diagrams": diagrams}
     if plan.prior is not None:

@@ -97,7 +97,7 @@ def write_report(
     for region, title in (("occluded", "occluded points"), ("near", "all points near the objects")):
         columns = [(head, name.format(region), f, d) for head, name, f, d in PROBABILITIES]
         parts += [f"## Probabilities, {title}", _figures_table(summaries, labels, columns)]
-    with_prior = [s for s in summaries if s.variant.preset is not None]
+    with_prior = [s for s in summaries if s.variant.retriever is not None]
     if with_prior:
         parts += ["## Recognition", _figures_table(with_prior, labels, RECOGNISED)]
         parts += ["## Retrieval", _figures_table(with_prior, labels, PLACEMENT)]

@@ -29,12 +29,10 @@ from brrp_cli.evaluation.work import Plan
 from brrp_cli.files import sha256_file, write_bytes
 from brrp_cli.ground_truth.scenes import Scene, find_scenes
 from brrp_cli.ground_truth.true_meshes import truth_cache
-from brrp_cli.methods.check_prior import check_prior
-from brrp_cli.methods.pointsdf.weights import describe_weights
 from brrp_cli.methods.registry import METHODS
 from brrp_cli.prior.store import Prior
 from brrp_cli.progress import progress
-from brrp_cli.retrieval.choose import USE_APPEARANCE, USE_CLIP, resolve_name
+from brrp_cli.retrieval.choose import USE_CLIP, resolve_name
 from brrp_cli.retrieval.clip.model_files import clip_folder, need_clip_folder
 from brrp_cli.stop import stopped
 from brrp_cli.threads import cores
@@ -85,12 +83,13 @@ def evaluate(request: Request, say: Callable[[str], None] = lambda text: None) -
     scenes = find_scenes(request.scenes, request.selection)
     opened = _prior(request)
     prior = None if opened is None else {"path": str(opened.path), "digest": opened.digest}
+    training = described_weights(request)
     weights = named_weights(request.weights)
     variants = expand(
         request.methods,
         request.presets,
         request.ks,
-        [resolve_name(name, request.clip_dir, opened) for name in request.retrievers],
+        [resolve_name(name, request.clip_dir) for name in request.retrievers],
         request.shifts,
         list(weights),
     )
@@ -138,7 +137,7 @@ def evaluate(request: Request, say: Callable[[str], None] = lambda text: None) -
         about = {
             **parameters,
             "prior": prior,
-            "trained": {name: describe_weights(path) for name, path in weights.items()},
+            "trained": {name: training[path] for name, path in weights.items()},
             "command": " ".join(["brrp", *sys.argv[1:]]),
             "machine": machine(),
             "bootstrap_rounds": ROUNDS,
@@ -153,14 +152,24 @@ def evaluate(request: Request, say: Callable[[str], None] = lambda text: None) -
     return Result(summaries, labels, lost, files)
 
 
+def described_weights(request: Request) -> dict[Path, dict[str, Any]]:
+    """What each file says of its training. Errors: WeightsError for one that cannot be used."""
+    describers = (METHODS[name].describe_weights for name in request.methods if name in METHODS)
+    return {
+        path: describe(path)
+        for describe in describers
+        if describe is not None
+        for path in request.weights
+    }
+
+
 def named_weights(paths: Sequence[Path]) -> dict[str, Path]:
     """Weights by the names of their files, which stand for them in tables.
 
-    Errors: WeightsError for a file that cannot be used, or for two of one name.
+    Errors: WeightsError for two of one name.
     """
     found: dict[str, Path] = {}
     for path in paths:
-        describe_weights(path)
         if path.stem in found:
             raise WeightsError(
                 "Two files of weights have one name",
@@ -213,17 +222,13 @@ def _prior(request: Request) -> Prior | None:
 
 
 def _check_prior(prior: Prior | None, variants: Sequence[Variant]) -> None:
-    """What a variant lacks in the prior is told now, not in every row. Errors: PriorError,
-    RetrievalError."""
-    from brrp_cli.retrieval.appearance import need_appearance
-
+    """What a variant lacks in the prior is told now, not in every row. Errors: PriorError."""
     if prior is None:
         return
     for variant in variants:
-        if variant.method == "brrp":
+        check_prior = METHODS[variant.method].check_prior
+        if check_prior is not None:
             check_prior(prior, variant.config)
-        if variant.retriever in USE_APPEARANCE:
-            need_appearance(prior)
 
 
 def _prepare_clip(prior: Prior | None, folder: Path) -> None:

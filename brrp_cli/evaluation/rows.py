@@ -106,9 +106,8 @@ def _row(line: bytes) -> Row | None:
 
 
 def variant_of(row: Mapping[str, Any]) -> Variant:
-    """The variant that a row belongs to; rows of an older brrp have no weights."""
-    found: dict[str, Any] = {name: row.get(name) for name in VARIANT}
-    return Variant(**found)
+    """The variant that a row belongs to."""
+    return Variant(**{name: row[name] for name in VARIANT})
 
 
 def variant_columns(variant: Variant) -> Row:

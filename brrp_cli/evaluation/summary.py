@@ -18,10 +18,11 @@ from brrp_cli.evaluation.retrieval import (
     retrieval_calibration,
     with_places,
 )
-from brrp_cli.evaluation.rows import METRICS, STAGES, Row, variant_of
+from brrp_cli.evaluation.rows import METRICS, STAGES, Row, variant_columns, variant_of
 from brrp_cli.evaluation.score_object import REGIONS
 from brrp_cli.evaluation.variants import Variant
 from brrp_cli.evaluation.written_figures import WrittenFigures, written_figures, written_record
+from brrp_cli.methods.registry import METHODS
 from brrp_cli.reconstruction import FAILED, TOO_FEW_POINTS
 from brrp_cli.seeds import child_rng
 
@@ -130,13 +131,13 @@ def differences(
 
 def _knowledge(variant: Variant) -> int:
     """2 with a prior, 1 after training, 0 with neither."""
-    return 2 if variant.preset is not None else int(variant.weights is not None)
+    return 2 if METHODS[variant.method].uses_prior else int(variant.weights is not None)
 
 
 def as_record(summary: VariantSummary) -> dict[str, Any]:
     """Plain JSON: NaN is null, lengths in metres."""
     return {
-        "variant": asdict(summary.variant),
+        "variant": variant_columns(summary.variant),
         "objects": summary.objects,
         "failed": summary.failed,
         "empty": summary.empty,

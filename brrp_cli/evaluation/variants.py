@@ -7,8 +7,9 @@ from dataclasses import asdict, dataclass, fields, replace
 from itertools import product
 from typing import Any
 
-from brrp_cli.config import Config, preset
 from brrp_cli.errors import BrrpError
+from brrp_cli.methods.base import Method
+from brrp_cli.methods.configuration import as_record
 from brrp_cli.methods.registry import METHODS
 
 # Parts of a configuration that come after retrieval, or name it.
@@ -17,8 +18,8 @@ _AFTER_RETRIEVAL = ("preset", "k", "inference", "surface")
 
 @dataclass(frozen=True, order=True)
 class Variant:
-    """One way to run. `preset`, `k` and `retriever` are None where a method has no prior, `weights`
-    where it was not trained.
+    """One way to run. `preset` is None where the method has but one, `k` and `retriever` where it
+    has no such thing, `weights` where it was not trained.
 
     weights : name of what was trained; shift : pixels by which the masks are moved to the right
     """
@@ -35,24 +36,24 @@ class Variant:
         """All of it in words."""
         parts = [self.method]
         if self.preset is not None:
-            parts += [self.preset, f"k={self.k}", str(self.retriever)]
-        if self.weights is not None:
-            parts.append(self.weights)
+            parts.append(self.preset)
+        if self.k is not None:
+            parts.append(f"k={self.k}")
+        parts += [each for each in (self.retriever, self.weights) if each is not None]
         if self.shift:
             parts.append(f"shifted {self.shift} px")
         return " ".join(parts)
 
     @property
-    def config(self) -> Config:
-        """The effective configuration; the default preset's where there is none."""
-        config = preset(self.preset or "default")
+    def config(self) -> Any:
+        """The effective configuration of the method."""
+        config = METHODS[self.method].preset(self.preset)
         return config if self.k is None else replace(config, k=self.k)
 
     @property
     def configuration(self) -> dict[str, Any]:
         """What decides the results of this variant, without the preset's name."""
-        method = METHODS[self.method]
-        decides = method.configuration(self.config)
+        decides = as_record(self.config)
         decides.pop("preset", None)
         return {
             "method": self.method,
@@ -65,7 +66,7 @@ class Variant:
     @property
     def retrieval_key(self) -> str:
         """Equal for variants whose retrieval gives the same probabilities."""
-        config = {k: v for k, v in self.config.as_dict().items() if k not in _AFTER_RETRIEVAL}
+        config = {k: v for k, v in as_record(self.config).items() if k not in _AFTER_RETRIEVAL}
         return f"{self.retriever} {config}"
 
 
@@ -79,28 +80,45 @@ def expand(
 ) -> list[Variant]:
     """All combinations that mean something, in the order given, each once.
 
-    No k at all is the presets' own. Errors: BrrpError for an unknown method or preset, or for a
-    method that was trained without the name of any weights.
+    No preset is each method's first; of those given a method runs the ones that it has, and one
+    that has but one preset runs it in any case. No k is the presets' own. Errors: BrrpError for an
+    unknown method, for one that has none of several presets, and for one that was trained without
+    the name of any weights.
     """
     for name in methods:
         if name not in METHODS:
             raise BrrpError("No such method", found=name, expected=", ".join(METHODS))
     found: list[Variant] = []
-    for method, shift in product(methods, shifts):
-        if METHODS[method].uses_weights:
-            if not weights:
-                raise BrrpError(f"{method} needs trained weights", fix="pass --weights FILE")
-            found += [Variant(method, shift=shift, weights=name) for name in weights]
-            continue
-        if not METHODS[method].uses_prior:
-            found.append(Variant(method, shift=shift))
-            continue
+    for name, shift in product(methods, shifts):
+        method = METHODS[name]
+        if method.uses_weights and not weights:
+            raise BrrpError(f"{name} needs trained weights", fix="pass --weights FILE")
         found += [
-            Variant(method, name, k, retriever, shift=shift)
-            for name, retriever in product(presets, retrievers)
-            for k in (ks or [preset(name).k])
+            Variant(name, preset, k, retriever, trained, shift)
+            for preset in _presets(method, presets)
+            for retriever in (retrievers if method.uses_retriever else [None])
+            for trained in (weights if method.uses_weights else [None])
+            for k in _ks(method, preset, ks)
         ]
     return list(dict.fromkeys(found))
+
+
+def _presets(method: Method, asked: Sequence[str]) -> list[str | None]:
+    """The presets to run; None where the method has but one."""
+    if len(method.presets) == 1:
+        return [None]
+    if not asked:
+        return [next(iter(method.presets))]
+    known = [name for name in asked if name in method.presets]
+    if not known:
+        method.preset(asked[0])
+    return list(known)
+
+
+def _ks(method: Method, preset: str | None, asked: Sequence[int]) -> list[int | None]:
+    """How many objects are retrieved; None where the method's configuration has no `k`."""
+    own = getattr(method.preset(preset), "k", None)
+    return [None] if own is None else list(asked) or [own]
 
 
 def same_results(variants: Sequence[Variant]) -> dict[Variant, Variant]:

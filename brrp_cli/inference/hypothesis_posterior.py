@@ -3,13 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from brrp_cli.inference.posterior import HilbertPosterior, mean_occupancy
+from brrp_cli.inference.posterior import HilbertPosterior, mean_occupancy, occupancy
 from brrp_cli.inference.prior_mean import PriorMeanGrid
 from brrp_cli.reconstruction import METRES, Axes
+
+if TYPE_CHECKING:
+    import h5py
+
+    from brrp_cli.hdf5 import SharedParts
 
 # Standard deviation of the logistic distribution over 4: a surface whose occupancy is a logistic
 # function of the way across it has this over the gradient as standard deviation of its place.
@@ -27,6 +33,8 @@ class HypothesisPosterior:
     mean : m of C hypotheses; which : (P,) the hypothesis of each particle; correction : the
     particles' weights
     """
+
+    kind: ClassVar[str] = "hypotheses"
 
     mean: PriorMeanGrid
     which: NDArray[np.int64]
@@ -71,3 +79,36 @@ class HypothesisPosterior:
         ]
         steepness = np.maximum(np.linalg.norm(slope, axis=0), LOGISTIC / LARGEST)
         return np.asarray(LOGISTIC / steepness, dtype=np.float32)
+
+    def particle_volumes(self, axes: Axes) -> NDArray[np.float32]:
+        """Occupancy probability (P, nx, ny, nz) of each particle on a grid."""
+        return occupancy(self.mean.volume(axes)[self.which] + self.correction.logit_volume(axes))
+
+    def write(self, group: h5py.Group, shared: SharedParts) -> None:
+        """The correction as its class writes it, and attributes mean_lower (3), mean_spacing,
+        outside; mean (C, nx, ny, nz) float16, logits; which (P,) int64."""
+        self.correction.write(group, shared)
+        group.attrs["mean_lower"] = self.mean.lower
+        group.attrs["mean_spacing"] = self.mean.spacing
+        group.attrs["outside"] = self.mean.outside
+        group.create_dataset(
+            "mean",
+            data=self.mean.values,
+            chunks=(1, *self.mean.values.shape[1:]),
+            compression="gzip",
+            shuffle=True,
+            fletcher32=True,
+        )
+        group.create_dataset("which", data=self.which, chunks=self.which.shape, fletcher32=True)
+
+    @classmethod
+    def read(cls, group: h5py.Group, shared: SharedParts) -> HypothesisPosterior:
+        """What `write` wrote. Errors: KeyError, ValueError."""
+        mean = PriorMeanGrid(
+            lower=np.asarray(group.attrs["mean_lower"], dtype=np.float64),
+            spacing=float(group.attrs["mean_spacing"]),
+            values=np.asarray(group["mean"], dtype=np.float16),
+            outside=float(group.attrs["outside"]),
+        )
+        which = np.asarray(group["which"], dtype=np.int64)
+        return HypothesisPosterior(mean, which, HilbertPosterior.read(group, shared))

@@ -2,26 +2,29 @@
 
 from __future__ import annotations
 
+from typing import Protocol, runtime_checkable
+
 import numpy as np
-import torch
 from numpy.typing import NDArray
 
-from brrp_cli.inference.hypothesis_posterior import HypothesisPosterior
-from brrp_cli.inference.posterior import HilbertPosterior
 from brrp_cli.reconstruction import Axes, OccupancyPosterior
+
+
+@runtime_checkable
+class HasParticles(Protocol):
+    """A posterior of several particles."""
+
+    def particle_volumes(self, axes: Axes) -> NDArray[np.float32]:
+        """Occupancy probability (P, nx, ny, nz) of each particle on a grid of camera-frame
+        coordinates, metres."""
 
 
 def particle_volumes(posterior: OccupancyPosterior, axes: Axes) -> NDArray[np.float32]:
     """Occupancy probability (P, nx, ny, nz) of each particle on a grid of camera-frame
     coordinates, metres; their mean over P is `posterior.probability_volume(axes)`.
 
-    V-PRISM and PointSDF have no particles: P is 1, and that is the mean.
+    Where a posterior has no particles P is 1, and that is the mean.
     """
-    if isinstance(posterior, HypothesisPosterior):
-        logits = posterior.mean.volume(axes)[posterior.which]
-        logits = logits + posterior.correction.logit_volume(axes)
-    elif isinstance(posterior, HilbertPosterior):
-        logits = posterior.logit_volume(axes)
-    else:
-        return posterior.probability_volume(axes)[None]
-    return np.asarray(torch.sigmoid(torch.from_numpy(logits)).numpy())
+    if isinstance(posterior, HasParticles):
+        return posterior.particle_volumes(axes)
+    return posterior.probability_volume(axes)[None]

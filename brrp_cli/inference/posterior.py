@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 import torch
@@ -10,6 +11,11 @@ from numpy.typing import NDArray
 
 from brrp_cli.inference.hinge import HingeGrid, factors, grid_logits
 from brrp_cli.reconstruction import LOGIT_VARIANCE, Axes
+
+if TYPE_CHECKING:
+    import h5py
+
+    from brrp_cli.hdf5 import SharedParts
 
 # So many points at once: their products stay in the cache.
 CHUNK = 2_048
@@ -22,6 +28,8 @@ class HilbertPosterior:
     weights : (P, H + 1) float32; center : (3,) float64, metres, camera frame, centre of the hinge
     grid; reach : half-width of the cube in which samples constrained the map, metres.
     """
+
+    kind: ClassVar[str] = "hilbert_map"
 
     weights: NDArray[np.float32]
     center: NDArray[np.float64]
@@ -72,6 +80,46 @@ class HilbertPosterior:
             torch.from_numpy(self.weights), (local[0], local[1], local[2]), self.grid
         )
         return np.asarray(logits.numpy())
+
+    def particle_volumes(self, axes: Axes) -> NDArray[np.float32]:
+        """Occupancy probability (P, nx, ny, nz) of each particle on a grid."""
+        return occupancy(self.logit_volume(axes))
+
+    def write(self, group: h5py.Group, shared: SharedParts) -> None:
+        """Attributes center (3), reach, hinge_lower (3), hinge_counts (3), hinge_spacing and
+        feature_floor; weights (P, H + 1) float32."""
+        group.attrs["center"] = self.center
+        group.attrs["reach"] = self.reach
+        group.attrs["hinge_lower"] = self.grid.lower
+        group.attrs["hinge_counts"] = self.grid.counts
+        group.attrs["hinge_spacing"] = self.grid.spacing
+        group.attrs["feature_floor"] = self.grid.floor
+        group.create_dataset(
+            "weights", data=self.weights, chunks=self.weights.shape, fletcher32=True
+        )
+
+    @classmethod
+    def read(cls, group: h5py.Group, shared: SharedParts) -> HilbertPosterior:
+        """What `write` wrote. Errors: KeyError, ValueError."""
+        attributes = group.attrs
+        x, y, z = (float(v) for v in attributes["hinge_lower"])
+        nx, ny, nz = (int(n) for n in attributes["hinge_counts"])
+        return HilbertPosterior(
+            weights=np.asarray(group["weights"], dtype=np.float32),
+            center=np.asarray(attributes["center"], dtype=np.float64),
+            grid=HingeGrid(
+                (x, y, z),
+                (nx, ny, nz),
+                float(attributes["hinge_spacing"]),
+                float(attributes["feature_floor"]),
+            ),
+            reach=float(attributes["reach"]),
+        )
+
+
+def occupancy(logits: NDArray[np.floating]) -> NDArray[np.float32]:
+    """sigmoid(logits), of the same shape."""
+    return np.asarray(torch.sigmoid(torch.from_numpy(logits)).numpy())
 
 
 def mean_occupancy(logits: NDArray[np.floating]) -> NDArray[np.float32]:

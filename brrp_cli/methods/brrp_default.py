@@ -21,7 +21,6 @@ from brrp_cli.inference.prior_mean import (
     grid_over,
     shape_logits,
 )
-from brrp_cli.methods.check_prior import no_distances
 from brrp_cli.observation.ray_samples import ObjectObservation
 from brrp_cli.observation.support_plane import Plane
 from brrp_cli.prior.store import Prior
@@ -187,8 +186,6 @@ def _surface(hypothesis: Hypothesis) -> Array:
 def _distance(hypothesis: Hypothesis, points: Array) -> Array:
     """Signed distance (n,), metres, of points (n, 3), camera frame, to the placed shape."""
     stored = hypothesis.model.stored
-    if stored.distances is None:
-        raise no_distances(stored.name)
     T_object_cam = np.linalg.inv(hypothesis.T_cam_object)
     unit = stored.half_extent * hypothesis.scale
     return stored.distances.signed_distance(transform_points(T_object_cam, points)) * unit

@@ -38,8 +38,8 @@ class PriorObject:
         base_scale * scale: metres, centred on the bounding box
     poses : resting poses, most probable first
     record : how it was made (repair, sample mix, original size); plain JSON
-    appearance : what it looks like; None in a prior of an older brrp
-    distances : signed distances to its surface, normalised; None in a prior of an older brrp
+    appearance : what it looks like; its colours are 0 where the mesh has none
+    distances : signed distances to its surface, normalised
     """
 
     name: str
@@ -53,5 +53,5 @@ class PriorObject:
     clouds: dict[float, FeatureCloud]
     poses: list[RestingPose]
     record: dict[str, Any]
-    appearance: Appearance | None = None
-    distances: DistanceField | None = None
+    appearance: Appearance
+    distances: DistanceField

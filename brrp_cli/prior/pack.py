@@ -19,7 +19,7 @@ from brrp_cli.prior.shard import APPEARANCE, ARRAYS, DISTANCES, StoredObject
 def pack(item: PriorObject, input_sha256: str) -> StoredObject:
     """As it is stored: clouds joined, features and their normals in half precision."""
     clouds = list(item.clouds.values())
-    arrays = {
+    arrays: dict[str, NDArray[Any]] = {
         "box": np.stack([item.center - _half(item), item.center + _half(item)]),
         "samples": item.samples,
         "labels": item.labels,
@@ -32,16 +32,12 @@ def pack(item: PriorObject, input_sha256: str) -> StoredObject:
         "cloud_fpfh": np.concatenate([cloud.fpfh for cloud in clouds]),
         "pose_T": np.stack([pose.T_plane_object for pose in item.poses]),
         "pose_probability": np.array([pose.probability for pose in item.poses]),
+        **{f"{APPEARANCE}/{key}": value for key, value in vars(item.appearance).items()},
+        f"{DISTANCES}/lower": item.distances.lower,
+        f"{DISTANCES}/spacing": np.array([item.distances.spacing]),
+        f"{DISTANCES}/values": item.distances.values,
     }
-    if item.appearance is not None:
-        arrays |= {f"{APPEARANCE}/{key}": value for key, value in vars(item.appearance).items()}
-    if item.distances is not None:
-        arrays |= {
-            f"{DISTANCES}/lower": item.distances.lower,
-            f"{DISTANCES}/spacing": np.array([item.distances.spacing]),
-            f"{DISTANCES}/values": item.distances.values,
-        }
-    typed = {key: arrays[key].astype(ARRAYS[key][0]) for key in ARRAYS if key in arrays}
+    typed = {key: arrays[key].astype(dtype) for key, (dtype, _) in ARRAYS.items()}
     return StoredObject(item.name, input_sha256, typed, item.record)
 
 
@@ -74,24 +70,12 @@ def unpack(stored: StoredObject, description: str) -> PriorObject:
             for T, p in zip(arrays["pose_T"], arrays["pose_probability"], strict=True)
         ],
         record=stored.record,
-        appearance=unpack_appearance(stored.arrays),
-        distances=_unpack_distances(stored.arrays),
+        appearance=Appearance(
+            **{f.name: arrays[f"{APPEARANCE}/{f.name}"] for f in fields(Appearance)}
+        ),
+        distances=DistanceField(
+            lower=arrays[f"{DISTANCES}/lower"],
+            spacing=float(arrays[f"{DISTANCES}/spacing"][0]),
+            values=arrays[f"{DISTANCES}/values"].astype(np.float32),
+        ),
     )
-
-
-def _unpack_distances(arrays: dict[str, NDArray[Any]]) -> DistanceField | None:
-    if f"{DISTANCES}/values" not in arrays:
-        return None
-    return DistanceField(
-        lower=arrays[f"{DISTANCES}/lower"],
-        spacing=float(arrays[f"{DISTANCES}/spacing"][0]),
-        values=arrays[f"{DISTANCES}/values"].astype(np.float32),
-    )
-
-
-def unpack_appearance(arrays: dict[str, NDArray[Any]]) -> Appearance | None:
-    """The descriptors among a shard's arrays; None in a shard of an older brrp."""
-    found = {field.name: arrays.get(f"{APPEARANCE}/{field.name}") for field in fields(Appearance)}
-    if any(value is None for value in found.values()):
-        return None
-    return Appearance(**{key: value for key, value in found.items() if value is not None})

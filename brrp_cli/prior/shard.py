@@ -21,8 +21,6 @@
         distances/spacing   (1,)    f8
         distances/values    (a, b, c) f2  negative inside
 
-Schema 1 had neither appearance nor distances; its shards are still read.
-
 Every data set is chunked with fletcher32, shuffle and gzip. `content_sha256` covers the arrays and
 the record, so that an object can be taken over from a shard that no manifest vouches for.
 """
@@ -108,8 +106,6 @@ def write_shard(path: Path, objects: list[StoredObject], parameters: dict[str, A
             group.attrs["record"] = json.dumps(stored.record)
             group.attrs["content_sha256"] = _content_sha256(stored.arrays, stored.record)
             for key, (dtype, _) in ARRAYS.items():
-                if key not in stored.arrays:
-                    continue
                 group.create_dataset(
                     key,
                     data=stored.arrays[key].astype(dtype),
@@ -201,18 +197,13 @@ def read_stored(file: h5py.File, name: str) -> StoredObject:
     reading = _Reading(where)
     group = _hard(file, f"objects/{name}", where)
     arrays: dict[str, NDArray[Any]] = {}
-    # Schema 1 has neither. Where one was taken out later, the checksum tells.
-    absent = tuple(f"{name}/" for name in (APPEARANCE, DISTANCES) if name not in group)
     for key, (dtype, shape) in ARRAYS.items():
-        if not key.startswith(absent):
-            arrays[key] = _read_array(group, key, dtype, shape, reading)
+        arrays[key] = _read_array(group, key, dtype, shape, reading)
     record = parse_json(group.attrs["record"])
     if _content_sha256(arrays, record) != group.attrs["content_sha256"]:
         raise damaged(where, "data that do not have the object's checksum")
     starts = arrays["cloud_starts"]
-    if DISTANCES in group and not (
-        arrays[f"{DISTANCES}/spacing"][0] > 0 and min(arrays[f"{DISTANCES}/values"].shape) > 1
-    ):
+    if arrays[f"{DISTANCES}/spacing"][0] <= 0 or min(arrays[f"{DISTANCES}/values"].shape) < 2:
         raise damaged(where, "distances without a grid")
     if starts[0] != 0 or starts[-1] != reading.lengths["p"] or (np.diff(starts) < 0).any():
         raise damaged(where, "clouds that overlap")
@@ -276,8 +267,6 @@ def _read_array(
 def _content_sha256(arrays: dict[str, NDArray[Any]], record: dict[str, Any]) -> str:
     digest = hashlib.sha256(json.dumps(record, sort_keys=True).encode())
     for key, (dtype, _) in ARRAYS.items():
-        if key not in arrays:
-            continue
         array = np.ascontiguousarray(arrays[key].astype(dtype))
         digest.update(f"{key}{array.shape}".encode())
         digest.update(array.tobytes())

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -17,7 +18,7 @@ from brrp_cli.frames.frame import Frame
 from brrp_cli.frames.npz import load_frame
 from brrp_cli.geometry import transform_points
 from brrp_cli.observation.support_plane import Plane
-from brrp_cli.reconstruction import OccupancyPosterior, Surface
+from brrp_cli.reconstruction import StoredPosterior, Surface
 from brrp_cli.results.write import FRAME, POSTERIOR, RECORD, SCHEMA, mesh_name
 
 if TYPE_CHECKING:
@@ -26,10 +27,15 @@ if TYPE_CHECKING:
 INSIDE_DEMO = "result"
 AGAIN = "run `brrp reconstruct` again"
 
+# From the path of posterior.h5 to posteriors by object id.
+OpenPosterior = Callable[[Path], dict[int, StoredPosterior]]
+
 
 @dataclass(frozen=True)
 class StoredResult:
-    """What `write_results` wrote. record : the content of result.json.
+    """What `write_results` wrote.
+
+    record : the content of result.json; open_posterior : reads the methods' posteriors
 
     Meshes, points and the plane are given in the frame of the meshes (`record["frame"]`), metres;
     the posteriors and `frame` know the camera frame only.
@@ -37,6 +43,7 @@ class StoredResult:
 
     folder: Path
     record: dict[str, Any]
+    open_posterior: OpenPosterior
 
     @cached_property
     def T_frame_cam(self) -> NDArray[np.float64]:
@@ -63,11 +70,9 @@ class StoredResult:
         return load_frame(self.folder / FRAME)
 
     @cached_property
-    def posteriors(self) -> dict[int, OccupancyPosterior]:
+    def posteriors(self) -> dict[int, StoredPosterior]:
         """Posteriors by object id. Errors: BrrpError."""
-        from brrp_cli.results.posterior_file import open_posterior
-
-        return open_posterior(self.folder / POSTERIOR)
+        return self.open_posterior(self.folder / POSTERIOR)
 
     @property
     def plane_cam(self) -> Plane | None:
@@ -101,8 +106,10 @@ class StoredResult:
         )
 
 
-def open_result(folder: str | Path) -> StoredResult:
+def open_result(folder: str | Path, open_posterior: OpenPosterior) -> StoredResult:
     """The results in a folder that `brrp reconstruct` wrote, or in one of `brrp demo`.
+
+    open_posterior : called when the posteriors are asked for
 
     Errors: ResultError if there are none, or if they are of another schema.
     """
@@ -139,7 +146,7 @@ def open_result(folder: str | Path) -> StoredResult:
             found=f"{type(error).__name__}: {error}",
             fix=AGAIN,
         ) from error
-    return StoredResult(folder, record)
+    return StoredResult(folder, record, open_posterior)
 
 
 def _check(record: dict[str, Any]) -> None:

@@ -16,7 +16,12 @@ from brrp_cli.files import atomic_folder, check_writable, refuse_folder
 from brrp_cli.frames.frame import Frame
 from brrp_cli.frames.npz import save_frame
 from brrp_cli.geometry import transform_points
-from brrp_cli.reconstruction import ObjectReconstruction, Retrieved, Surface
+from brrp_cli.reconstruction import (
+    ObjectReconstruction,
+    Reconstruction,
+    Retrieved,
+    Surface,
+)
 from brrp_cli.rendering.preview import preview
 from brrp_cli.results.posterior_file import save_posteriors
 from brrp_cli.surface.colours import scale_top, spread, spread_colours
@@ -24,8 +29,6 @@ from brrp_cli.version import __version__
 
 if TYPE_CHECKING:
     import trimesh
-
-    from brrp_cli.api import Reconstruction
 
 SCHEMA = 1
 RECORD = "result.json"

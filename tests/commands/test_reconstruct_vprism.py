@@ -170,8 +170,8 @@ def test_the_posterior_can_be_asked_again(out, again):
     [
         ("--prior", "prior/"),
         ("--k", 3),
-        ("--preset", "default"),
-        ("--retriever", "fitness"),
+        ("--preset", "paper"),
+        ("--retriever", "uniform"),
         ("--clip-dir", "clip/"),
         ("--device", "cuda"),
     ],

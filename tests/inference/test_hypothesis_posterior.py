@@ -13,7 +13,8 @@ from brrp_cli.inference.hinge import HingeGrid
 from brrp_cli.inference.hypothesis_posterior import LARGEST, HypothesisPosterior
 from brrp_cli.inference.posterior import HilbertPosterior
 from brrp_cli.inference.prior_mean import PriorMeanGrid
-from brrp_cli.results.posterior_file import open_posterior, save_posteriors
+from brrp_cli.methods.posterior_file import open_posterior
+from brrp_cli.results.posterior_file import save_posteriors
 
 CENTER = np.array([0.1, -0.2, 0.9])
 GRID = HingeGrid((-0.05, -0.05, -0.05), (3, 3, 3), 0.05, 1e-7)

@@ -8,7 +8,8 @@ import pytest
 from brrp_cli.config import InferenceConfig, SurfaceConfig
 from brrp_cli.geometry import similarity, transform_points
 from brrp_cli.inference.infer import LabelledPoints, infer_posterior
-from brrp_cli.results.posterior_file import open_posterior, save_posteriors
+from brrp_cli.methods.posterior_file import open_posterior
+from brrp_cli.results.posterior_file import save_posteriors
 from brrp_cli.surface.extract import extract_surface
 
 # Fewer particles than the paper has, in a smaller cube: the same code in a second.

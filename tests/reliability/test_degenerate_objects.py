@@ -12,12 +12,12 @@ import trimesh
 from table_scene import MESHES, SHAPE, K, photograph, placed
 
 from brrp_cli import open_prior, reconstruct
-from brrp_cli.api import Reconstruction
 from brrp_cli.errors import OutputError
 from brrp_cli.frames.build import make_frame
 from brrp_cli.frames.frame import Frame
 from brrp_cli.prior.build.build import build_prior
 from brrp_cli.prior.parameters import BuildParameters
+from brrp_cli.reconstruction import Reconstruction
 from brrp_cli.results.write import write_results
 
 BOX = 1

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from brrp_cli import api
-from brrp_cli.config import Config
+from brrp_cli.config import SurfaceConfig
+from brrp_cli.methods.each_object import with_surface
 from brrp_cli.reconstruction import FAILED, OK, TOO_FEW_POINTS, ObjectReconstruction, Retrieved
 
 
@@ -48,13 +48,13 @@ def test_it_is_the_failure_of_its_object(field: str, stage: str, bad: float) -> 
     holder = item if stage == "Inference" else item.retrieved[1]
     value = getattr(holder, field)
     setattr(holder, field, np.where(np.ones_like(value), bad, value) if np.ndim(value) else bad)
-    found = api._whole(3, lambda: item, Config())
+    found = with_surface(3, lambda: item, SurfaceConfig())
     assert (found.object_id, found.status) == (3, FAILED)
     assert f"{stage} gave numbers that are NaN or infinite" in found.message
     assert field in found.message and found.retrieved == [] and found.surface is None
 
 
 def test_whole_numbers_pass() -> None:
-    assert api._whole(3, inferred, Config()).status == OK
+    assert with_surface(3, inferred, SurfaceConfig()).status == OK
     few = ObjectReconstruction(4, TOO_FEW_POINTS, "none", n_points=0)
-    assert api._whole(4, lambda: few, Config()) is few
+    assert with_surface(4, lambda: few, SurfaceConfig()) is few

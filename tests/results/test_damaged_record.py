@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
+from brrp_cli.api import open_result
 from brrp_cli.cli import main
 from brrp_cli.errors import ResultError
-from brrp_cli.results.read import open_result
 
 RECORD = {
     "schema": 1,

@@ -9,14 +9,19 @@ import numpy as np
 import trimesh
 from table_scene import TABLE, in_camera, photograph, placed
 
-from brrp_cli.api import Reconstruction
 from brrp_cli.config import SurfaceConfig, preset
 from brrp_cli.inference.hinge import HingeGrid
 from brrp_cli.inference.hypothesis_posterior import HypothesisPosterior
 from brrp_cli.inference.posterior import HilbertPosterior
 from brrp_cli.inference.prior_mean import PriorMeanGrid
 from brrp_cli.raycast import raycasting_scene
-from brrp_cli.reconstruction import OK, TOO_FEW_POINTS, ObjectReconstruction, Retrieved
+from brrp_cli.reconstruction import (
+    OK,
+    TOO_FEW_POINTS,
+    ObjectReconstruction,
+    Reconstruction,
+    Retrieved,
+)
 from brrp_cli.results.write import write_results
 from brrp_cli.shapes import solids
 from brrp_cli.surface.extract import extract_surface

@@ -12,6 +12,7 @@ from types import SimpleNamespace
 import atheris
 import numpy as np
 
+from brrp_cli.api import open_result
 from brrp_cli.errors import BrrpError
 from brrp_cli.frames.build import make_frame
 from brrp_cli.frames.intrinsics import read_intrinsics
@@ -25,7 +26,6 @@ from brrp_cli.prior.build.descriptions import read_descriptions
 from brrp_cli.prior.index import INDEX_FILE, index_of, read_index
 from brrp_cli.prior.manifest import FILE, parse_manifest
 from brrp_cli.prior.shard import object_names, open_shard, read_stored
-from brrp_cli.results.read import open_result
 from brrp_cli.retrieval.table import TableRetriever
 from fuzzing.place import PRIOR, REPLACED, WORK, written
 

@@ -6,23 +6,45 @@ whose surface lies at 0.3. No prior, no table: nothing but what was seen of each
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
+from functools import lru_cache, partial
+from pathlib import Path
 from time import perf_counter
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from brrp_cli.config import PointSDFConfig
-from brrp_cli.frames.frame import Frame
+from brrp_cli.device import pick_device
+from brrp_cli.files import sha256_file
+from brrp_cli.frames.frame import BACKGROUND, Frame
+from brrp_cli.methods.base import Setup
 from brrp_cli.methods.coarse_to_fine import coarse_to_fine_volume
+from brrp_cli.methods.configuration import as_record
+from brrp_cli.methods.each_object import with_surface
+from brrp_cli.methods.pointsdf.decoder_file import read_decoder, write_decoder
 from brrp_cli.methods.pointsdf.farthest_points import farthest_points
+from brrp_cli.methods.pointsdf.weights import Weights, load_weights
 from brrp_cli.observation.ray_samples import box_center
-from brrp_cli.reconstruction import METRES, OK, TOO_FEW_POINTS, Axes, ObjectReconstruction
+from brrp_cli.observation.support_plane import Plane, fit_plane
+from brrp_cli.progress import progress
+from brrp_cli.reconstruction import (
+    METRES,
+    OK,
+    TOO_FEW_POINTS,
+    Axes,
+    ObjectReconstruction,
+    Reconstruction,
+)
 
 if TYPE_CHECKING:
+    import h5py
+
+    from brrp_cli.hdf5 import SharedParts
     from brrp_cli.methods.pointsdf.network import Decoder, PointSDF
 
+NAME = "pointsdf"
 # A logistic distribution's standard deviation over its scale, and the scale of a surface whose
 # logit has a gradient is one over that.
 LOGISTIC = np.pi / np.sqrt(3)
@@ -39,6 +61,8 @@ class PointSDFPosterior:
     object's cloud; center : (3,) metres, camera frame, of the cloud's bounding box; scale : metres
     of the decoder's unit
     """
+
+    kind: ClassVar[str] = "pointsdf"
 
     decoder: Decoder
     code: NDArray[np.float32]
@@ -100,6 +124,84 @@ class PointSDFPosterior:
         ]
         steepness = np.maximum(np.linalg.norm(slope, axis=0), LOGISTIC / LARGEST)
         return np.asarray(LOGISTIC / steepness, dtype=np.float32)
+
+    def write(self, group: h5py.Group, shared: SharedParts) -> None:
+        """Attributes decoder (its name among what is shared), center (3), scale, half_width; code
+        (C,) float32."""
+        group.attrs["decoder"] = shared.write("decoder", self.decoder, write_decoder)
+        group.attrs["center"] = self.center
+        group.attrs["scale"] = self.scale
+        group.attrs["half_width"] = self.half_width
+        group.create_dataset("code", data=self.code, chunks=self.code.shape, fletcher32=True)
+
+    @classmethod
+    def read(cls, group: h5py.Group, shared: SharedParts) -> PointSDFPosterior:
+        """What `write` wrote, on the CPU. Errors: KeyError, ValueError."""
+        decoder = shared.read(str(group.attrs["decoder"]), read_decoder)
+        code = np.asarray(group["code"], dtype=np.float32)
+        if code.shape != (decoder.config.code,):
+            raise ValueError(f"a code of shape {code.shape}, not ({decoder.config.code},)")
+        return PointSDFPosterior(
+            decoder,
+            code,
+            np.asarray(group.attrs["center"], dtype=np.float64),
+            float(group.attrs["scale"]),
+            float(group.attrs["half_width"]),
+        )
+
+
+def run(frame: Frame, setup: Setup) -> Reconstruction:
+    """Every object of the frame; nothing is drawn but the plane's candidates."""
+    config = setup.config
+    assert isinstance(config, PointSDFConfig) and setup.weights is not None
+    device = pick_device(setup.device)
+    digest = sha256_file(setup.weights)
+    loaded = _loaded(setup.weights, digest, device)
+    found = reconstruct_pointsdf(frame, loaded.network, config)
+    return Reconstruction(
+        frame=frame,
+        objects=[
+            with_surface(item.object_id, partial(_itself, item), config.surface)
+            for item in progress(found, "surfaces")
+        ],
+        plane=_plane(frame, config, setup.seed),
+        method=NAME,
+        retriever=None,
+        prior_path=None,
+        prior_digest=None,
+        configuration={
+            **as_record(config),
+            "network": asdict(loaded.network.config),
+            "weights": {
+                "path": str(setup.weights),
+                "sha256": digest,
+                "training": loaded.training,
+            },
+        },
+        seed=setup.seed,
+        device=device,
+    )
+
+
+def _plane(frame: Frame, config: PointSDFConfig, seed: int) -> Plane | None:
+    """The network asks for no table; the picture does, to show the scene upright."""
+    background = frame.points[frame.valid & (frame.segmap == BACKGROUND)]
+    seen = frame.points[frame.valid & (frame.segmap != BACKGROUND)]
+    if not len(seen):
+        return None
+    return fit_plane(background, config.observation, seed, box_center(seen))
+
+
+@lru_cache(maxsize=4)
+def _loaded(weights: Path, digest: str, device: str) -> Weights:
+    """Read once for all frames of a process, while the file stays the same."""
+    found = load_weights(weights)
+    found.network.to(device)
+    return found
+
+
+def _itself(item: ObjectReconstruction) -> ObjectReconstruction:
+    return item
 
 
 def reconstruct_pointsdf(

@@ -7,27 +7,42 @@ Scenes", 2024 (arXiv 2403.08106); the baseline of the paper's experiments.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from time import perf_counter
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from brrp_cli.config import VPrismConfig
 from brrp_cli.frames.frame import Frame
+from brrp_cli.methods.base import Setup
 from brrp_cli.methods.coarse_to_fine import coarse_to_fine_volume
+from brrp_cli.methods.configuration import as_record
+from brrp_cli.methods.each_object import with_surface
 from brrp_cli.methods.vprism.expected_softmax import expected_softmax
 from brrp_cli.methods.vprism.hinge_points import scene_hinges
 from brrp_cli.methods.vprism.kernel_features import KernelBasis
+from brrp_cli.methods.vprism.map_file import read_map, write_map
 from brrp_cli.methods.vprism.softmax_map import SoftmaxMap, fit_softmax_map
 from brrp_cli.observation.scene_samples import FREE, SceneSamples, sample_scene
+from brrp_cli.progress import progress
 from brrp_cli.reconstruction import (
     LOGIT_VARIANCE,
     OK,
     TOO_FEW_POINTS,
     Axes,
     ObjectReconstruction,
+    Reconstruction,
 )
 from brrp_cli.seeds import child_rng
+
+if TYPE_CHECKING:
+    import h5py
+
+    from brrp_cli.hdf5 import SharedParts
+
+NAME = "vprism"
 
 
 @dataclass(frozen=True)
@@ -36,6 +51,8 @@ class VPrismPosterior:
 
     `label` is the object's class in `scene`, which all objects of a scene share.
     """
+
+    kind: ClassVar[str] = "vprism"
 
     scene: SoftmaxMap
     label: int
@@ -70,20 +87,51 @@ class VPrismPosterior:
         _, variance = self.scene.logits(points, [FREE, self.label])
         return variance.sum(axis=0).astype(np.float32)
 
+    def write(self, group: h5py.Group, shared: SharedParts) -> None:
+        """Attributes map (the name of the scene's map among what is shared), label (the object's
+        class) and bounds (2, 3)."""
+        group.attrs["map"] = shared.write("map", self.scene, write_map)
+        group.attrs["label"] = self.label
+        group.attrs["bounds"] = self.bounds
 
-def reconstruct_vprism(frame: Frame, config: VPrismConfig, seed: int) -> list[ObjectReconstruction]:
-    """Occupancy of every object of the frame, by id, ascending. The same seed gives the same bytes.
+    @classmethod
+    def read(cls, group: h5py.Group, shared: SharedParts) -> VPrismPosterior:
+        """What `write` wrote. Errors: KeyError, ValueError."""
+        scene = shared.read(str(group.attrs["map"]), read_map)
+        label = int(group.attrs["label"])
+        if not 0 < label < len(scene.mean):
+            raise ValueError(f"class {label} of {len(scene.mean)}")
+        return VPrismPosterior(scene, label, np.asarray(group.attrs["bounds"], dtype=np.float64))
 
-    `seconds` holds each object's equal share of the scene's time.
-    """
+
+def run(frame: Frame, setup: Setup) -> Reconstruction:
+    """Every object of the frame, on the CPU. The same seed gives the same bytes."""
+    config = setup.config
+    assert isinstance(config, VPrismConfig)
     start = perf_counter()
-    scene = sample_scene(frame, config.observation, seed)
-    seconds = perf_counter() - start
-    found = reconstruct_scene(scene, config, seed)
-    for item in found:
-        if item.posterior is not None:
-            item.seconds = {"observation": seconds / len(scene.points), **item.seconds}
-    return found
+    scene = sample_scene(frame, config.observation, setup.seed)
+    seconds = {"observation": perf_counter() - start}
+    found = reconstruct_scene(scene, config, setup.seed)
+    return Reconstruction(
+        frame=frame,
+        objects=[
+            with_surface(item.object_id, partial(_itself, item), config.surface)
+            for item in progress(found, "surfaces")
+        ],
+        plane=scene.plane,
+        method=NAME,
+        retriever=None,
+        prior_path=None,
+        prior_digest=None,
+        configuration=as_record(config),
+        seed=setup.seed,
+        device="cpu",
+        seconds=seconds,
+    )
+
+
+def _itself(item: ObjectReconstruction) -> ObjectReconstruction:
+    return item
 
 
 def reconstruct_scene(

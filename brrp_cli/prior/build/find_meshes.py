@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import re
 from collections import defaultdict
 from dataclasses import dataclass
 from pathlib import Path
 
 from brrp_cli.errors import MeshError
+from brrp_cli.prior.names import safe_name
 
 SUFFIXES = (".obj", ".ply", ".stl", ".off", ".glb")
 
@@ -31,11 +31,6 @@ class MeshSource:
     name: str
     path: Path
     relative: str
-
-
-def safe_name(text: str) -> str:
-    """`text` as a name that is safe in file systems and in HDF5."""
-    return re.sub(r"[^\w.-]+", "_", text).strip("._") or "object"
 
 
 def find_meshes(folder: Path) -> list[MeshSource]:

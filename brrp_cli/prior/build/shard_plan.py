@@ -4,14 +4,11 @@ from __future__ import annotations
 
 import hashlib
 import json
-import re
 from collections.abc import Sequence
 from typing import Any
 
 MEAN_OBJECTS = 8
 MAX_OBJECTS = 16
-APPEARANCE_NAME = re.compile(r"appearance-[0-9a-f]{16}\.npy")
-SHARD_NAME = re.compile(r"shards/shard-[0-9a-f]{16}\.h5")
 
 
 def plan_shards(names: Sequence[str]) -> list[list[str]]:

@@ -50,7 +50,7 @@ def test_reconstruct_writes_what_the_other_methods_write(out):
 def test_the_record_says_what_was_trained(out, learnt):
     record = json.loads((out[0] / "result.json").read_text())
     assert record["method"] == "pointsdf" and record["prior"] is None
-    assert record["config"]["level"] == record["config"]["surface"]["level"] == 0.3
+    assert record["config"]["surface"]["level"] == 0.3
     weights = record["config"]["weights"]
     assert weights["training"]["name"] == "eight" and len(weights["sha256"]) == 64
     assert record["objects"][0]["uncertainty_unit"] == "metre"

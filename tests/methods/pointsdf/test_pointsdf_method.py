@@ -5,7 +5,7 @@ import pytest
 import torch
 from eight_objects import MESHES, NETWORK
 
-from brrp_cli.config import PointSDFConfig, preset
+from brrp_cli.config import PointSDFConfig
 from brrp_cli.frames.frame import Frame
 from brrp_cli.ground_truth.truth import true_mesh_in_camera
 from brrp_cli.methods.pointsdf.method import (
@@ -16,9 +16,10 @@ from brrp_cli.methods.pointsdf.method import (
 )
 from brrp_cli.methods.pointsdf.network import PointSDF
 from brrp_cli.methods.pointsdf.weights import load_weights
+from brrp_cli.methods.posterior_file import open_posterior
 from brrp_cli.raycast import inside
 from brrp_cli.reconstruction import METRES
-from brrp_cli.results.posterior_file import open_posterior, save_posteriors
+from brrp_cli.results.posterior_file import save_posteriors
 from brrp_cli.surface.extract import extract_surface, grid_axes
 
 CENTER = np.array([0.1, -0.2, 0.8])
@@ -77,7 +78,7 @@ def test_odd_lattices_are_filled_to_their_ends(ball):
 
 
 def test_the_surface_lies_where_occupancy_is_the_papers(ball):
-    config = replace(preset("default").surface, level=PointSDFConfig().level)
+    config = PointSDFConfig().surface
     assert config.level == 0.3
     surface = extract_surface(ball, on_ball(RADIUS), config)
     radius = np.linalg.norm(surface.vertices - CENTER, axis=1)

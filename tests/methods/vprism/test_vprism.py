@@ -9,7 +9,8 @@ from brrp_cli.config import VPrismConfig
 from brrp_cli.dependencies import import_open3d
 from brrp_cli.frames.frame import Frame
 from brrp_cli.geometry import transform_points
-from brrp_cli.methods.vprism.method import reconstruct_vprism
+from brrp_cli.methods.vprism.method import reconstruct_scene
+from brrp_cli.observation.scene_samples import sample_scene
 from brrp_cli.reconstruction import OK, TOO_FEW_POINTS
 from brrp_cli.surface.extract import grid_axes
 
@@ -61,6 +62,10 @@ def frame():
         K=K,
         T_world_cam=T,
     )
+
+
+def reconstruct_vprism(frame, config, seed):
+    return reconstruct_scene(sample_scene(frame, config.observation, seed), config, seed)
 
 
 @pytest.fixture(scope="module")

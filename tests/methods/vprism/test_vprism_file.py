@@ -7,11 +7,12 @@ import numpy as np
 import pytest
 
 from brrp_cli.errors import BrrpError
+from brrp_cli.methods.posterior_file import open_posterior
 from brrp_cli.methods.vprism.kernel_features import KernelBasis, kernel_features
+from brrp_cli.methods.vprism.map_file import counting_pairs
 from brrp_cli.methods.vprism.method import VPrismPosterior
-from brrp_cli.methods.vprism.posterior_file import counting_pairs
 from brrp_cli.methods.vprism.softmax_map import SoftmaxMap
-from brrp_cli.results.posterior_file import open_posterior, save_posteriors
+from brrp_cli.results.posterior_file import save_posteriors
 
 RNG = np.random.default_rng(0)
 BOUNDS = np.array([[0.0, 0, 0], [0.8, 0.1, 0.1]])
@@ -62,7 +63,7 @@ def test_every_answer_survives_the_file(posteriors, path, tmp_path):
 
 def flip_a_covariance(path: Path) -> None:
     with h5py.File(path) as file:
-        offset = file["map/covariance"].id.get_chunk_info(0).byte_offset
+        offset = file["shared/map/covariance"].id.get_chunk_info(0).byte_offset
     with path.open("r+b") as stream:
         stream.seek(offset + 100)
         byte = stream.read(1)[0]
@@ -72,9 +73,9 @@ def flip_a_covariance(path: Path) -> None:
 
 def drop_a_hinge(path: Path) -> None:
     with h5py.File(path, "r+") as file:
-        hinges = file["map/hinges"][1:]
-        del file["map/hinges"]
-        file["map/hinges"] = hinges
+        hinges = file["shared/map/hinges"][1:]
+        del file["shared/map/hinges"]
+        file["shared/map/hinges"] = hinges
 
 
 def name_a_class_that_is_not_there(path: Path) -> None:
@@ -84,7 +85,7 @@ def name_a_class_that_is_not_there(path: Path) -> None:
 
 def lose_the_means(path: Path) -> None:
     with h5py.File(path, "r+") as file:
-        del file["map/mean"]
+        del file["shared/map/mean"]
 
 
 def cut_off(path: Path) -> None:

@@ -1,7 +1,8 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from brrp_cli.prior.build.shard_plan import MAX_OBJECTS, SHARD_NAME, plan_shards, shard_file
+from brrp_cli.prior.build.shard_plan import MAX_OBJECTS, plan_shards, shard_file
+from brrp_cli.prior.names import SHARD_NAME
 
 NAMES = st.lists(
     st.text("abcdef012_", min_size=1, max_size=6), min_size=2, max_size=60, unique=True

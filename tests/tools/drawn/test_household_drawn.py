@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
+from drawn.household import KINDS, draw_household_shape
 
 from brrp_cli.prior.build.solids import is_solid
-from brrp_cli.shapes.drawn import KINDS, draw_household_shape
 
 
 @pytest.mark.parametrize("kind", sorted(KINDS))

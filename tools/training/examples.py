@@ -33,7 +33,7 @@ from brrp_cli.methods.pointsdf.farthest_points import farthest_points
 from brrp_cli.observation.ray_samples import box_center
 from brrp_cli.raycast import Solid
 from brrp_cli.seeds import child_rng
-from brrp_cli.training.queries import draw_queries
+from training.queries import draw_queries
 
 SCHEMA = 1
 TRUTHS = ("closed", "exact")

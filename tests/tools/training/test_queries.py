@@ -1,9 +1,9 @@
 import numpy as np
 import trimesh
+from training.queries import AROUND, AROUND_MARGIN, FAR_HALF_WIDTH, NEAR, draw_queries
 
 from brrp_cli.geometry import similarity
 from brrp_cli.raycast import Solid
-from brrp_cli.training.queries import AROUND, AROUND_MARGIN, FAR_HALF_WIDTH, NEAR, draw_queries
 
 SCALE, COUNT = 0.15, 4000
 

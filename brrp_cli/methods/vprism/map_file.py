@@ -1,10 +1,9 @@
-"""V-PRISM's map in posterior.h5: one map of the whole scene, and a class in it for each object.
+"""V-PRISM's map of a whole scene in a file.
 
-    /map                gamma, feature_floor
-    /map/hinges         (H, 3) float64, metres, camera frame
-    /map/mean           (K, F) float64, F = H + 1, the bias last; class 0 is free space
-    /map/covariance     (K, N) float64, the entries that can count, see `counting_pairs`
-    /objects/ID         label: the object's class; bounds (2, 3)
+    gamma, feature_floor
+    hinges         (H, 3) float64, metres, camera frame
+    mean           (K, F) float64, F = H + 1, the bias last; class 0 is free space
+    covariance     (K, N) float64, the entries that can count, see `counting_pairs`
 
 Covariances are large: (K, F, F) float64 is 113 MB for ten objects. No point is near two hinges
 that are far from each other, so most entries only ever meet features that are 0. Without them and
@@ -19,7 +18,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brrp_cli.methods.vprism.kernel_features import KernelBasis
-from brrp_cli.methods.vprism.method import VPrismPosterior
 from brrp_cli.methods.vprism.softmax_map import SoftmaxMap
 
 if TYPE_CHECKING:
@@ -71,20 +69,6 @@ def read_map(group: h5py.Group) -> SoftmaxMap:
     covariance[:, rows, columns] = packed
     covariance[:, columns, rows] = packed
     return SoftmaxMap(basis, mean, covariance)
-
-
-def write_object(group: h5py.Group, posterior: VPrismPosterior) -> None:
-    """Write what is one object's own."""
-    group.attrs["label"] = posterior.label
-    group.attrs["bounds"] = posterior.bounds
-
-
-def read_object(group: h5py.Group, scene: SoftmaxMap) -> VPrismPosterior:
-    """The object's posterior in the map. Errors: KeyError, ValueError for a class it lacks."""
-    label = int(group.attrs["label"])
-    if not 0 < label < len(scene.mean):
-        raise ValueError(f"class {label} of {len(scene.mean)}")
-    return VPrismPosterior(scene, label, np.asarray(group.attrs["bounds"], dtype=np.float64))
 
 
 def _write(group: h5py.Group, name: str, data: NDArray[np.float64]) -> None:

@@ -2,11 +2,11 @@ import h5py
 import numpy as np
 import pytest
 from eight_objects import MESHES
+from training.examples import Recipe, make_examples, read_examples, scene_examples
 
 from brrp_cli.errors import BrrpError
 from brrp_cli.geometry import transform_points
 from brrp_cli.raycast import inside, raycasting_scene
-from brrp_cli.training.examples import Recipe, make_examples, read_examples, scene_examples
 
 RECIPE = Recipe(truth="exact", points=64, queries=256)
 

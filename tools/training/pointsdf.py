@@ -10,7 +10,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from time import monotonic
 from typing import Any
@@ -26,7 +26,7 @@ from brrp_cli.files import atomic_path, write_bytes
 from brrp_cli.methods.pointsdf.network import NetworkConfig, PointSDF
 from brrp_cli.methods.pointsdf.weights import save_weights
 from brrp_cli.seeds import child_rng, child_seed
-from brrp_cli.training.examples import Examples
+from training.examples import Examples
 
 LEVEL = 0.3
 SETTLING = 32  # batches
@@ -51,6 +51,16 @@ class TrainingConfig:
     precision: str = "float32"
     seed: int = 0
     cooling: int = 0
+
+
+def narrowed(config: NetworkConfig, width: float) -> NetworkConfig:
+    """`config` with `width` times as many features in every layer but the two codes."""
+
+    def fewer(count: int) -> int:
+        return max(8, round(count * width))
+
+    features = tuple(tuple(fewer(n) for n in layer) for layer in config.features)
+    return replace(config, features=features, hidden=fewer(config.hidden))
 
 
 @dataclass

@@ -4,10 +4,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from eight_objects import NETWORK
-
-from brrp_cli.errors import BrrpError
-from brrp_cli.methods.pointsdf.weights import load_weights
-from brrp_cli.training.pointsdf import (
+from training.pointsdf import (
     CHECKPOINT,
     HISTORY,
     Training,
@@ -15,8 +12,13 @@ from brrp_cli.training.pointsdf import (
     cooled,
     draw_batch,
     evaluate,
+    narrowed,
     split,
 )
+
+from brrp_cli.errors import BrrpError
+from brrp_cli.methods.pointsdf.network import NetworkConfig
+from brrp_cli.methods.pointsdf.weights import load_weights
 
 # Two epochs of four steps; dropout is on, so that its random numbers count too.
 SMALL = replace(NETWORK, features=((8,), (8,), (8,), (8,)), hidden=16, dropout=0.2)
@@ -172,3 +174,10 @@ def test_settled_statistics_answer_as_the_training_did(place, tmp_path):
     # A cloud's middle is 0 up to half precision, and is moved there when it is drawn.
     assert settled == pytest.approx(trained, rel=0.01)
     assert abs(settled - trained) < 0.2 * abs(lagging - trained)
+
+
+def test_a_narrowed_network_has_fewer_features_and_the_same_codes():
+    config = NetworkConfig()
+    half = narrowed(config, 0.5)
+    assert half.features[-1] == (128, 128, 256) and half.hidden == 256
+    assert replace(half, features=config.features, hidden=config.hidden) == config

@@ -1,9 +1,9 @@
 """Solids of no kind are solids."""
 
 import numpy as np
+from drawn.composed import MOST, PARTS, draw_composed_shape
 
 from brrp_cli.seeds import child_rng
-from brrp_cli.shapes.composed import MOST, PARTS, draw_composed_shape
 
 
 def drawn(number):

@@ -1,11 +1,7 @@
-"""PointSDF in posterior.h5: the decoder once, and what is each object's own.
+"""PointSDF's decoder in a file, which so answers without the weights that it came from.
 
-    /decoder            network: JSON of its NetworkConfig
-    /decoder/NAME       the decoder's tensors, float32
-    /objects/ID         center (3), scale, half_width
-    /objects/ID/code    (C,) float32
-
-So the file answers without the weights that it came from.
+network    JSON of its NetworkConfig
+NAME       the decoder's tensors, float32
 """
 
 from __future__ import annotations
@@ -15,8 +11,6 @@ from dataclasses import asdict
 from typing import TYPE_CHECKING
 
 import numpy as np
-
-from brrp_cli.methods.pointsdf.method import PointSDFPosterior
 
 if TYPE_CHECKING:
     import h5py
@@ -52,25 +46,3 @@ def read_decoder(group: h5py.Group) -> Decoder:
     except (RuntimeError, TypeError) as error:
         raise ValueError(error) from error
     return decoder.eval().requires_grad_(False)
-
-
-def write_object(group: h5py.Group, posterior: PointSDFPosterior) -> None:
-    """Write what is one object's own."""
-    group.attrs["center"] = posterior.center
-    group.attrs["scale"] = posterior.scale
-    group.attrs["half_width"] = posterior.half_width
-    group.create_dataset("code", data=posterior.code, chunks=posterior.code.shape, fletcher32=True)
-
-
-def read_object(group: h5py.Group, decoder: Decoder) -> PointSDFPosterior:
-    """The object's posterior. Errors: KeyError, ValueError."""
-    code = np.asarray(group["code"], dtype=np.float32)
-    if code.shape != (decoder.config.code,):
-        raise ValueError(f"a code of shape {code.shape}, not ({decoder.config.code},)")
-    return PointSDFPosterior(
-        decoder,
-        code,
-        np.asarray(group.attrs["center"], dtype=np.float64),
-        float(group.attrs["scale"]),
-        float(group.attrs["half_width"]),
-    )

@@ -1,0 +1,81 @@
+"""Object by object: whatever goes wrong with one is no matter of the others."""
+
+from __future__ import annotations
+
+import logging
+import time
+from collections.abc import Callable
+
+from brrp_cli.config import SurfaceConfig
+from brrp_cli.errors import BrrpError, PriorError
+from brrp_cli.finite import check_finite
+from brrp_cli.reconstruction import FAILED, NO_SURFACE, OK, TOO_FEW_POINTS, ObjectReconstruction
+from brrp_cli.surface.extract import extract_surface
+
+log = logging.getLogger(__name__)
+
+
+def with_surface(
+    object_id: int, infer: Callable[[], ObjectReconstruction], surface: SurfaceConfig
+) -> ObjectReconstruction:
+    """What `infer` says of one object, with its surface, or with the status of having failed.
+
+    Errors: PriorError, since a damaged prior is no fault of the object that comes upon it.
+    """
+    try:
+        result = infer()
+        _check_finite(result)
+        _add_surface(result, surface)
+    except PriorError:
+        raise
+    except BrrpError as error:
+        log.warning("Object %d: %s", object_id, error)
+        return ObjectReconstruction(object_id, FAILED, str(error))
+    except Exception as error:
+        # A library stumbled: Open3D, SciPy and torch do, over shapes that nobody thought of.
+        log.warning("Object %d: an error that brrp does not know: %r", object_id, error)
+        log.debug("Object %d", object_id, exc_info=True)
+        return ObjectReconstruction(
+            object_id, FAILED, f"an error that brrp does not know: {error!r}"
+        )
+    return result
+
+
+def too_few(object_id: int, count: int, needed: int) -> ObjectReconstruction:
+    """An object of `count` points where `needed` are the least that the method works with."""
+    message = f"{count} valid depth points, {needed} are needed"
+    return ObjectReconstruction(object_id, TOO_FEW_POINTS, message, n_points=count)
+
+
+def _add_surface(result: ObjectReconstruction, config: SurfaceConfig) -> None:
+    """Extract the surface of an object that has a posterior."""
+    if result.status != OK or result.posterior is None or result.observed is None:
+        return
+    start = time.perf_counter()
+    result.surface = extract_surface(result.posterior, result.observed, config)
+    result.seconds["surface"] = time.perf_counter() - start
+    if result.surface is None:
+        result.status = NO_SURFACE
+        result.message = "the map is occupied nowhere near the observed points"
+
+
+def _check_finite(item: ObjectReconstruction) -> None:
+    """All that inference says of one object but its posterior, which is evaluated where the
+    surface is looked for."""
+    check_finite(
+        "Inference",
+        center=item.center,
+        observed=item.observed,
+        unknown_probability=item.unknown_probability,
+        unknown_weight=item.unknown_weight,
+    )
+    for found in item.retrieved:
+        check_finite(
+            f"Registration of {found.name}",
+            probability=found.probability,
+            T_cam_object=found.T_cam_object,
+            scale=found.scale,
+            fitness=found.fitness,
+            alignment_score=found.alignment_score,
+            weight=found.weight,
+        )
