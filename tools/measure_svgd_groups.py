@@ -28,7 +28,7 @@ from torch import Tensor
 # The script also runs from a checkout that is not installed.
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from brrp_cli.inference.infer_hypotheses import systematic_resampling
+from brrp_cli.inference.infer_hypotheses import particles_of
 from brrp_cli.inference.svgd import groups_of, run_svgd
 
 NOISE = 0.5
@@ -80,7 +80,7 @@ def errors(
     generator: torch.Generator,
 ) -> list[float]:
     """mean, pooled, spread, weight and value as the head of this file has them."""
-    which = torch.from_numpy(systematic_resampling(problem.shares.numpy(), particles))
+    which = torch.from_numpy(particles_of(problem.shares.numpy(), particles)[0])
     dimension = problem.means.shape[1]
     start = 0.3 * torch.randn(particles, dimension, generator=generator, dtype=torch.float64)
     found = run_svgd(

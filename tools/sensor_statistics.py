@@ -32,8 +32,6 @@ from PIL import Image
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from brrp_cli.evaluation.scenes import find_scenes
-from brrp_cli.frames.segment import segment
 from tabletop.depth_statistics import (
     edge_offsets,
     face_residuals,
@@ -47,6 +45,8 @@ from tabletop.depth_statistics import (
 from brrp_cli.errors import BrrpError
 from brrp_cli.frames.build import make_frame
 from brrp_cli.frames.frame import Frame
+from brrp_cli.ground_truth.scenes import find_scenes
+from brrp_cli.segmentation.segment import segment
 
 FAR = 1.8  # metres: beyond, a step of disparity is larger than the unit of a millimetre
 COLUMNS = (

@@ -9,12 +9,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from brrp_cli.frames.plane import largest_plane
-from brrp_cli.frames.table import Table, find_table
 from numpy.typing import NDArray
 from scipy import ndimage
 
 from brrp_cli.geometry import backproject
+from brrp_cli.observation.support_plane import largest_plane
+from brrp_cli.segmentation.table_plane import Table, find_table
 
 SMOOTHING = 5.0  # pixels, standard deviation: a window of about 20 pixels
 ON_TABLE = 0.008  # metres perpendicular to the plane
