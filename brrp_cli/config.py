@@ -62,12 +62,26 @@ class ObservationConfig:
 class SensorConfig:
     """How far measured depth errs: a standard deviation of noise + noise_growth * depth^2, metres.
 
+    wave : metres, least standard deviation of the mean depth of a patch `patch` metres wide; more
+    is measured on the support plane, within `table_reach` metres of it, where `least_patches`
+    patches have `patch_points` pixels
+    bias : metres, standard deviation of what depth is off as a whole
+    pose_turn, pose_shift : radians and metres by which a placement may be off before anything is
+    seen
     sure : standard deviations in front of the measured depth from which on space is free for
     certain
     """
 
     noise: float = 0.0012
     noise_growth: float = 0.0015
+    wave: float = 0.0005
+    bias: float = 0.00035
+    patch: float = 0.01
+    table_reach: float = 0.015
+    least_patches: int = 30
+    patch_points: int = 8
+    pose_turn: float = 0.05
+    pose_shift: float = 0.005
     sure: float = 3.0
 
 
@@ -98,6 +112,7 @@ class SurfaceConfig:
     moved further, and where no stored object explains what is seen, the surface comes from marching
     cubes on a grid of about `nodes` nodes, whose spacing in metres lies between `finest` and
     `spacing`.
+    fidelity : metres, standard deviation of a stored mesh from its object
     keep_distance : metres; a component of the level set further from every observed point is
     hallucinated
     seen_share : of the observed points that a part near them must own to be joined to the largest,
@@ -116,6 +131,7 @@ class SurfaceConfig:
     farthest: float = 0.004
     wall_share: float = 0.4
     steps: int = 17
+    fidelity: float = 0.0002
     most_off: float = 0.05
 
 
