@@ -10,6 +10,7 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
+from brrp_cli.config.ranges import share
 from brrp_cli.errors import BrrpError
 
 
@@ -36,9 +37,9 @@ class RegistrationConfig:
 
     draw: int = 3
     correspondence_distance: float = 0.0075
-    edge_length: float = 0.9
+    edge_length: float = share(0.9)
     iterations: int = 100_000
-    confidence: float = 0.99
+    confidence: float = share(0.99)
 
 
 @dataclass(frozen=True)
@@ -83,7 +84,7 @@ class SurfaceConfig:
     than a half: at half of that overlap (Lipton et al., 2014, for F1).
     """
 
-    level: float = 0.4
+    level: float = share(0.4)
     spacing: float = 0.005
     # A component of the level set further than this from every observed point is hallucinated.
     keep_distance: float = 0.01
@@ -161,9 +162,9 @@ class WeighConfig:
 
     sharpness: float = 40.0
     unknown_score: float = 0.7
-    least_unknown: float = 0.1
-    most_unknown: float = 0.9
-    least_share: float = 1e-3
+    least_unknown: float = share(0.1)
+    most_unknown: float = share(0.9)
+    least_share: float = share(1e-3)
 
 
 @dataclass(frozen=True)
