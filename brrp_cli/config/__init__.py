@@ -11,6 +11,7 @@ from dataclasses import asdict, dataclass, field
 from typing import Any
 
 from brrp_cli.config.ranges import share
+from brrp_cli.config.retrieval import RetrievalConfig
 from brrp_cli.errors import BrrpError
 
 
@@ -255,6 +256,7 @@ class Config:
     registration: RegistrationConfig = field(default_factory=RegistrationConfig)
     observation: ObservationConfig = field(default_factory=ObservationConfig)
     inference: InferenceConfig = field(default_factory=InferenceConfig)
+    retrieval: RetrievalConfig = field(default_factory=RetrievalConfig)
     surface: SurfaceConfig = field(default_factory=SurfaceConfig)
     hypotheses: HypothesesConfig | None = field(default_factory=HypothesesConfig)
 
