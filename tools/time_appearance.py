@@ -63,7 +63,8 @@ def main(prior_path: Path, frame_path: Path) -> None:
         histograms = lit_histograms(seen, gains)
         clock.append(time.process_time())
         rows = shortlist.rows(seen, histograms)
-        found.append(alignment_score(seen, histograms, looks.rows(rows), rows, len(gains)))
+        stored = looks.rows(rows)
+        found.append(evidence(seen, histograms, stored, rows, len(gains), own.similarity))
         clock.append(time.process_time())
         for stage, spent in zip(seconds, np.diff(clock), strict=True):
             seconds[stage] += float(spent)

@@ -33,7 +33,8 @@ class SmoothDepthConfig:
 class TableConfig:
     """The table's plane and its extent.
 
-    points : so many are drawn for RANSAC; iterations : of it; tolerance : metres of its inliers
+    points : so many are drawn, and of those ransac_points for RANSAC; iterations : of it;
+    tolerance : metres of its inliers; min_points : of them, at least
     candidates : planes that are looked for; least : part of the points that a plane holds
     parallel : degrees between the table and a floor; height : metres of the table above a floor;
     of_floor : points of the table, as a part of the floor's
@@ -41,6 +42,8 @@ class TableConfig:
     """
 
     points: int = 40_000
+    ransac_points: int = 4_000
+    min_points: int = 100
     iterations: int = 1000
     tolerance: float = 0.01
     candidates: int = 3

@@ -61,9 +61,8 @@ def size_penalty(
     limit = np.float32(config.size_limit)
     off = (size.astype(np.float32) - stored) / spread
     larger = np.minimum(np.maximum(off, 0) ** 2, limit)
-    smaller = np.minimum(
-        np.maximum(-off, 0) ** 2 * np.array(config.smaller, dtype=np.float32), limit
-    )
+    weight = np.array(config.smaller, dtype=np.float32)
+    smaller = np.minimum(np.maximum(-off, 0) ** 2 * weight, limit)
     against = (larger + np.float32((1 - hidden) ** 2) * smaller).sum(axis=-1)
     return np.asarray(-np.nanmin(against, axis=-1) / 2, dtype=np.float32)
 

@@ -95,7 +95,12 @@ def _largest_planes(
         if len(rest) < least:
             break
         model = largest_plane(
-            rest, config.tolerance, config.iterations, child_seed(seed, "table", index)
+            rest,
+            child_seed(seed, "table", index),
+            tolerance=config.tolerance,
+            iterations=config.iterations,
+            drawn_points=config.ransac_points,
+            min_points=config.min_points,
         )
         if model is None:
             break
