@@ -29,7 +29,7 @@ from brrp_cli.retrieval.illuminants import lights, local_lights, log_prior
 from brrp_cli.retrieval.observed_appearance import see_object
 from brrp_cli.retrieval.score_fusion import believe
 from brrp_cli.retrieval.shortlist import Shortlist
-from brrp_cli.retrieval.similarity import lit_histograms
+from brrp_cli.retrieval.similarity import evidence, lit_histograms
 
 
 @click.command()
