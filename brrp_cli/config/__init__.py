@@ -188,7 +188,7 @@ class MeanConfig:
     score under `sure` widens it by `doubt` for each unit. An object that none explains is completed
     by a network, which is evaluated at every node where the coarse ones around are not all
     `beyond_doubt`; its logit is `shell_logit` at least for `shell` metres behind what is seen of
-    it. Space is empty that lies more than `carve_depth` in front of the measured depth, or
+    it, and `shell_before` metres in front. Space is empty that lies more than `carve_depth` in front of the measured depth, or
     `carve_plane` below the plane, or less than `carve_behind` behind what is no object's and more
     than `carve_pixels` from the mask.
     """
@@ -202,6 +202,7 @@ class MeanConfig:
     beyond_doubt: float = 1.5
     shell: float = 0.006
     shell_logit: float = 1.0
+    shell_before: float = 0.001
     carve_depth: float = 0.006
     carve_plane: float = 0.004
     carve_behind: float = 0.01
