@@ -188,9 +188,9 @@ class MeanConfig:
     score under `sure` widens it by `doubt` for each unit. An object that none explains is completed
     by a network, which is evaluated at every node where the coarse ones around are not all
     `beyond_doubt`; its logit is `shell_logit` at least for `shell` metres behind what is seen of
-    it, and `shell_before` metres in front. Space is empty that lies more than `carve_depth` in front of the measured depth, or
-    `carve_plane` below the plane, or less than `carve_behind` behind what is no object's and more
-    than `carve_pixels` from the mask.
+    it, and `shell_before` metres in front. Space is empty that lies more than `carve_depth` in
+    front of the measured depth, or `carve_plane` below the plane, or less than `carve_behind`
+    behind what is no object's and more than `carve_pixels` from the mask.
     """
 
     nodes: int = 200_000
