@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 if TYPE_CHECKING:
     import h5py
+    from numpy.typing import NDArray
 
 T = TypeVar("T")
 
@@ -59,3 +60,10 @@ class SharedParts:
             self._read[name] = read(self._group[name])
         found: T = self._read[name]
         return found
+
+
+def write_compressed(group: h5py.Group, name: str, data: NDArray[Any]) -> None:
+    """A data set, compressed, with a checksum for each chunk."""
+    group.create_dataset(
+        name, data=data, chunks=True, compression="gzip", shuffle=True, fletcher32=True
+    )

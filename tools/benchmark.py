@@ -9,7 +9,9 @@ The made frame is that of `brrp demo`, its first four objects, with the starter 
 is first reconstructed once, then `--repeats` times: medians, least and greatest. Stages are those
 of one thread; the whole is timed with one thread and with `--workers`. The plain implementation
 (tools/plain) gets all cores; a machine that is busy disturbs both, so read the ratios. `cold` is
-`brrp reconstruct FRAME` as a process of its own, imports included. With --json a line is appended.
+`brrp reconstruct FRAME` as a process of its own, imports included. Denormal numbers, which some
+processors multiply 20 times more slowly and others at full speed, are counted by the folder of
+brrp_cli that made them. With --json a line is appended.
 """
 
 from __future__ import annotations
@@ -28,6 +30,7 @@ import click
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from plain.reconstruct import STAGES, reconstruct_plainly
+from speed.denormals import by_folder, watch_denormals
 from speed.frames import four_objects
 from speed.growth import cases
 from speed.machine import Machine, limits, measure_machine
@@ -155,6 +158,11 @@ def measure(
             f"  limit of {stage}: {limit.operations / 1e9:.2f} G operations and "
             f"{limit.bytes / 1e6:.0f} MB an object"
         )
+    with watch_denormals() as watched:
+        alone(frame)
+    denormals = by_folder(watched)
+    told = ", ".join(f"{count} in {folder}" for folder, count in denormals.items())
+    click.echo(f"  denormal numbers: {told or 'none'}")
     found: dict[str, Any] = {
         "name": name,
         "objects": count,
@@ -162,6 +170,7 @@ def measure(
         "stages": {stage: value.as_dict() for stage, value in stages.items()},
         "whole": {key: value.as_dict() for key, value in wholes.items()},
         "limits": {stage: asdict(limit) for stage, limit in least.items()},
+        "denormals": denormals,
     }
     if plain:
         found["plain"] = {**plain, "cpu": plain_cpu, "objects_timed": options.plain_objects}
@@ -219,7 +228,7 @@ def measure_growth(frame: Frame, prior: Prior, options: Options, quick: bool) ->
 
 
 def _starter() -> Path:
-    from brrp_cli.prior.build.starter import starter_prior
+    from brrp_cli.prior.build.build.starter import starter_prior
 
     return starter_prior()
 

@@ -56,11 +56,11 @@ def main(prior_path: Path, objects: int, output: Path, strange: bool, overwrite:
     """Make a prior of so many OBJECTS in the folder OUTPUT."""
     try:
         prior = open_prior(prior_path)
-        if prior.appearance is None or objects < len(prior.names):
+        if objects < len(prior.names):
             raise PriorError(
                 "The prior cannot be copied",
                 where=prior_path,
-                expected=f"descriptors, and at most {objects} objects",
+                expected=f"at most {objects} objects",
                 found=f"{len(prior.names)} objects",
             )
         with atomic_folder(output, overwrite=overwrite, mark=FILE) as folder:
@@ -74,7 +74,6 @@ def main(prior_path: Path, objects: int, output: Path, strange: bool, overwrite:
 def copy_prior(prior: Prior, count: int, folder: Path, strange: bool) -> None:
     """Write all of it into an empty folder."""
     manifest = prior.manifest
-    assert prior.appearance is not None
     (folder / "shards").mkdir()
     for shard in manifest.shards:
         shutil.copyfile(prior.path / shard.file, folder / shard.file)

@@ -4,9 +4,9 @@
     python tools/export_drawn_shapes.py --kind composed --count 200 -o composed
 
 household: hNNN_KIND.obj, boxes, cans, bottles, mugs, bowls, plates, tools and fruit of
-`brrp_cli/shapes`, of random dimensions. composed: cNNN.obj, solids of no kind, a few parts that run
-into each other. Each is drawn from its own random numbers, so that shape NNN of a seed is the same
-whatever the count.
+`tools/drawn/household.py`, of random dimensions. composed: cNNN.obj, solids of no kind, a few parts
+that run into each other. Each is drawn from its own random numbers, so that shape NNN of a seed is
+the same whatever the count.
 """
 
 from __future__ import annotations
@@ -21,11 +21,12 @@ from tqdm import tqdm
 # The script also runs from a checkout that is not installed.
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
+from drawn.composed import draw_composed_shape
+from drawn.household import draw_household_shape
+
 from brrp_cli.errors import BrrpError
 from brrp_cli.files import write_bytes
 from brrp_cli.seeds import child_rng
-from brrp_cli.shapes.composed import draw_composed_shape
-from brrp_cli.shapes.drawn import draw_household_shape
 
 
 def _household(seed: int, number: int) -> tuple[str, Any]:

@@ -36,6 +36,7 @@ from tqdm import tqdm
 # The script also runs from a checkout that is not installed.
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
+from brrp_cli.completion.completed_mean import empty_space
 from brrp_cli.completion.network import Network
 from brrp_cli.completion.point_features import COUNT, WHOLE, point_features
 from brrp_cli.completion.visible_part import visible_part
@@ -45,7 +46,6 @@ from brrp_cli.evaluation.perturb import shift_masks, with_noise
 from brrp_cli.geometry import transform_points
 from brrp_cli.ground_truth.scenes import Scene, find_scenes
 from brrp_cli.ground_truth.truth import TrueObject, true_mesh
-from brrp_cli.inference.prior_mean import empty_space
 from brrp_cli.observation.ray_samples import observe
 from brrp_cli.prior.build.repair import repair
 from brrp_cli.raycast import raycasting_scene

@@ -24,11 +24,11 @@ import trimesh
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from brrp_cli.api import reconstruct
+from brrp_cli.completion.completed_mean import empty_space
 from brrp_cli.config import MeanConfig, preset
 from brrp_cli.dependencies import import_open3d
 from brrp_cli.ground_truth.metrics import sample_surface
 from brrp_cli.ground_truth.scenes import find_scenes, true_mesh_in_camera
-from brrp_cli.inference.prior_mean import empty_space
 from brrp_cli.methods.registry import METHODS
 from brrp_cli.prior.store import Prior, open_prior
 from brrp_cli.reconstruction import ObjectReconstruction, Reconstruction

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Install the project into a fresh virtual environment (.venv-test), then check everything: lint,
-# format, types, layers, tests. Arguments go to pytest.
+# format, types, layers, documentation, the wheel, tests. Arguments go to pytest.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 rm -rf .venv-test
@@ -11,6 +11,9 @@ bin="$PWD/.venv-test/bin"
 "$bin/ruff" format --check .
 "$bin/mypy"
 "$bin/lint-imports"
+# mkdocs-material's notice of its own end of life is no fault of these pages.
+NO_MKDOCS_2_WARNING=1 "$bin/mkdocs" build --strict --quiet --site-dir .venv-test/site
+bash tools/check_wheel.sh .venv-test
 # Two workers of one thread each: more threads than cores would slow one another down.
 # `pytest`, not `python -m pytest`: the installed package is tested, not the checkout.
 # It ends with 1 where a test fails and with 5 where none ran.

@@ -47,7 +47,6 @@ def main(prior_path: Path, frame_path: Path) -> None:
     except BrrpError as error:
         raise click.ClickException(str(error)) from error
     looks = prior.appearance
-    assert looks is not None
     own = preset("default").retrieval
     gains = lights(own.illuminants)
     shortlist = Shortlist(looks.first, own)

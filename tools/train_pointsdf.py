@@ -37,11 +37,12 @@ from tqdm import tqdm
 # The script also runs from a checkout that is not installed.
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
+from training.examples import TRUTHS, Recipe, make_examples, read_examples
+
 from brrp_cli.errors import BrrpError
 from brrp_cli.evaluation.request import find_data_root
 from brrp_cli.ground_truth.scenes import find_scenes
 from brrp_cli.ground_truth.true_meshes import truth_cache
-from brrp_cli.training.examples import TRUTHS, Recipe, make_examples, read_examples
 
 
 @click.command()
@@ -99,15 +100,16 @@ def main(
     examples_only: bool,
 ) -> None:
     """Train on SCENES, or on the examples that are in OUTPUT already."""
+    from training.pointsdf import Training, TrainingConfig, narrowed, split
+
     from brrp_cli.device import pick_device
     from brrp_cli.methods.pointsdf.network import NetworkConfig
-    from brrp_cli.training.pointsdf import Training, TrainingConfig, split
 
     began = monotonic()
     try:
         if cooling > epochs:
             raise BrrpError("--cooling is a part of --epochs", found=f"{cooling} of {epochs}")
-        network = NetworkConfig().narrowed(width)
+        network = narrowed(NetworkConfig(), width)
         recipe = Recipe(truth, network.points, scale=network.scale)
         folder = output / "examples"
         if scenes is not None:

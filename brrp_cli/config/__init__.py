@@ -73,6 +73,19 @@ class ObservationConfig:
 
 
 @dataclass(frozen=True)
+class SensorConfig:
+    """How far measured depth errs: a standard deviation of noise + noise_growth * depth^2, metres.
+
+    sure : standard deviations in front of the measured depth from which on space is free for
+    certain
+    """
+
+    noise: float = 0.0012
+    noise_growth: float = 0.0015
+    sure: float = 3.0
+
+
+@dataclass(frozen=True)
 class InferenceConfig:
     """Hilbert map and SVGD (paper, sections III-A, III-B and IV-D)."""
 
@@ -91,16 +104,33 @@ class InferenceConfig:
 
 @dataclass(frozen=True)
 class SurfaceConfig:
-    """Marching cubes on the mean occupancy at `level`.
+    """The surface where the mean occupancy is `level`.
 
-    Where half of the volume is unseen, the overlap with the truth is expected to be largest at less
-    than a half: at half of that overlap (Lipton et al., 2014, for F1).
+    A stored mesh is moved along its normals by at most `farthest` metres, and inwards or outwards
+    by no more than a share `wall_share` of the wall's thickness; the level set is looked for at
+    `steps` places of that way. Where more than a share `most_off` of its vertices would have to be
+    moved further, and where no stored object explains what is seen, the surface comes from marching
+    cubes on a grid of about `nodes` nodes, whose spacing in metres lies between `finest` and
+    `spacing`.
+    keep_distance : metres; a component of the level set further from every observed point is
+    hallucinated
+    seen_share : of the observed points that a part near them must own to be joined to the largest,
+    a tenth of it where the part has a share `volume_share` of the largest's volume; route_radius :
+    metres, of what joins them, which is two nodes thick at least
     """
 
-    level: float = share(0.4)
+    level: float = share(0.5)
     spacing: float = 0.005
-    # A component of the level set further than this from every observed point is hallucinated.
+    finest: float = 0.002
+    nodes: int = 300_000
     keep_distance: float = 0.01
+    seen_share: float = 0.03
+    volume_share: float = 0.1
+    route_radius: float = 0.003
+    farthest: float = 0.004
+    wall_share: float = 0.4
+    steps: int = 17
+    most_off: float = 0.05
 
 
 @dataclass(frozen=True)
@@ -128,11 +158,15 @@ class SearchConfig:
     Starts are `matchings` feature matchings and every resting pose turned `turns` times. The best
     `coarse` of them slide `coarse_steps` steps with `coarse_points` observed points, which reach
     the surface from `coarse_distance`; the best `middle` of those, and then the best `fine`, slide
-    again, each with more points. The best `rescaled` are then tried at `scales` times the true
-    size; the alignment score falls by scale_cost * ln(scale)^2. No other size is tried where it
-    reaches `settled`, and nothing is refined further where none of the placements reaches
-    `hopeless` or all stay `beaten` behind another model's.
-    Of placements whose surfaces lie within `distinct` metres the best is kept, `kept` in all.
+    again, each with more points. A stored object has its stored size. That it is something of the
+    kind, of another size, is a hypothesis of its own, with a size that is refined with the pose:
+    the best `rescaled` placements begin it at `sizes` times the true size, observed points pull
+    from `size_distance` metres, and sizes whose logarithm is within `least_size_change` of 0 or
+    beyond `most_size` are dropped. Its alignment score falls by size_cost, which over `sharpness`
+    (see WeighConfig) is the log odds against another size, and by size_spread_cost * ln(size)^2. No
+    other size is tried where the score reaches `settled`, and nothing is refined further where none
+    of the placements reaches `hopeless` or all stay `beaten` behind another model's. Of placements
+    whose surfaces lie within `distinct` metres the best is kept, `kept` in all.
     """
 
     turns: int = 24
@@ -152,10 +186,13 @@ class SearchConfig:
     fine_points: int = 1000
     fine_steps: int = 10
     seen_points: int = 150
-    scales: tuple[float, ...] = (0.8, 0.9, 1.1, 1.25)
+    sizes: tuple[float, ...] = (0.85, 1.18)
     rescaled: int = 2
-    scale_distance: float = 0.015
-    scale_cost: float = 0.6
+    size_distance: float = 0.015
+    size_cost: float = 0.1
+    size_spread_cost: float = 0.6
+    least_size_change: float = 0.04
+    most_size: float = 0.5
     hopeless: float = 0.1
     beaten: float = 0.3
     settled: float = 0.9
@@ -182,22 +219,21 @@ class WeighConfig:
 
 @dataclass(frozen=True)
 class MeanConfig:
-    """Mean functions of hypotheses, logits on a grid of about `nodes` nodes.
+    """Prior mean functions of hypotheses, as logits.
 
-    A placed shape is -(signed distance - growth) / width, limited to +-limit; an alignment
-    score under `sure` widens it by `doubt` for each unit. An object that none explains is completed
-    by a network, which is evaluated at every node where the coarse ones around are not all
-    `beyond_doubt`; its logit is `shell_logit` at least for `shell` metres behind what is seen of
-    it, and `shell_before` metres in front. Space is empty that lies more than `carve_depth` in
-    front of the measured depth, or `carve_plane` below the plane, or less than `carve_behind`
-    behind what is no object's and more than `carve_pixels` from the mask.
+    A placed shape is -(signed distance) / width, limited to +-limit; an alignment score under
+    `sure` widens it by `doubt` metres for each unit. An object that none explains is completed on a
+    grid of about `nodes` nodes by a network, which is evaluated at every node where the coarse ones
+    around are not all `beyond_doubt`; its logit is `shell_logit` at least for `shell` metres behind
+    what is seen of it, and `shell_before` metres in front. Space is empty that lies more than
+    `carve_depth` in front of the measured depth, or `carve_plane` below the plane, or less than
+    `carve_behind` behind what is no object's and more than `carve_pixels` from the mask.
     """
 
     nodes: int = 200_000
-    growth: float = 0.0015
-    width: float = 0.002
+    width: float = 0.001
     sure: float = 0.9
-    doubt: float = 0.02
+    doubt: float = 0.01
     limit: float = 5.0
     beyond_doubt: float = 1.5
     shell: float = 0.006
@@ -242,9 +278,11 @@ class CompletionConfig:
 class FittedMapConfig:
     """A Hilbert map whose hinge points fill the box of what was seen and of the hypotheses.
 
-    hinges : about so many, no closer than `least_spacing`; margin : of the box
-    behind : observed surface points are taken this far behind the surface, where they are inside
+    hinges : about so many, no closer than `least_spacing`; margin : of the box, metres
+    behind : metres behind and in front of the seen surface where it is sampled
     start : standard deviation of the particles' first weights
+    stiffness : lambda_norm is so many times as large for a placed shape, which is known better than
+    a completed one; least_weight : hypotheses that weigh less are left out
     """
 
     hinges: int = 1000
@@ -259,6 +297,8 @@ class FittedMapConfig:
     behind: float = 0.004
     lambda_observed: float = 50.0
     lambda_norm: float = 0.5
+    stiffness: float = 8.0
+    least_weight: float = 0.01
 
 
 @dataclass(frozen=True)
@@ -270,6 +310,7 @@ class HypothesesConfig:
     mean: MeanConfig = field(default_factory=MeanConfig)
     completion: CompletionConfig = field(default_factory=CompletionConfig)
     map: FittedMapConfig = field(default_factory=FittedMapConfig)
+    sensor: SensorConfig = field(default_factory=SensorConfig)
 
 
 @dataclass(frozen=True)

@@ -5,19 +5,26 @@ from __future__ import annotations
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from brrp_cli.errors import BrrpError
 from brrp_cli.evaluation.memory import peak_megabytes, reset_peak
 from brrp_cli.evaluation.perturb import shift_masks, with_noise
+from brrp_cli.evaluation.recognition import half_extent, recognition
 from brrp_cli.evaluation.rows import STAGES, Row, RowLog, variant_columns
 from brrp_cli.evaluation.score_object import placement_error, score_probabilities, score_shape
 from brrp_cli.evaluation.variants import Variant
 from brrp_cli.evaluation.work import Plan, lost_row
 from brrp_cli.frames.frame import Frame
 from brrp_cli.ground_truth.scenes import Scene
+from brrp_cli.ground_truth.surface_metrics import (
+    TrueSurface,
+    no_surface,
+    score_written,
+    true_surface,
+)
 from brrp_cli.ground_truth.true_meshes import close_truth
 from brrp_cli.ground_truth.true_shape import TrueShape, true_shape
 from brrp_cli.methods.base import Setup
@@ -48,7 +55,7 @@ def evaluate_scene(plan: Plan, scene: Scene, variants: list[Variant], log: Path)
         rows.append(lost_row(scene.name, plan.view, v, str(error)) for v in variants)
         return
     seen = with_noise(clean, child_rng(plan.seed, "noise", scene.name)) if plan.noise else clean
-    truths = _truths(plan, scene, clean)
+    truths = true_objects(plan, scene, clean)
     memory: dict[str, RememberingRetriever] = {}
     for variant in variants:
         frame = shift_masks(seen, variant.shift)
@@ -61,16 +68,30 @@ def evaluate_scene(plan: Plan, scene: Scene, variants: list[Variant], log: Path)
             _draw(plan.pictures, scene, frame, variant, found)
 
 
-def _truths(plan: Plan, scene: Scene, clean: Frame) -> dict[int, TrueShape | BrrpError]:
-    """The true shape of each object with enough pixels, or why there is none; by id."""
-    truths: dict[int, TrueShape | BrrpError] = {}
+class Truth(NamedTuple):
+    """One true object: occupancy on grids and its surface, camera frame; `half_extent`: half the
+    longest side of its box along its own axes, metres."""
+
+    shape: TrueShape
+    surface: TrueSurface
+    half_extent: float
+
+
+def true_objects(plan: Plan, scene: Scene, clean: Frame) -> dict[int, Truth | BrrpError]:
+    """The truth of each object with enough pixels, or why there is none; by id."""
+    assert clean.T_world_cam is not None
+    truths: dict[int, Truth | BrrpError] = {}
     for object_id in clean.object_ids:
         if np.count_nonzero(clean.segmap == object_id) < MIN_PIXELS:
             continue
         rng = child_rng(plan.seed, "truth", scene.name, object_id)
         try:
-            meshes = close_truth(scene.object(object_id), plan.data_root, plan.cache)
-            truths[object_id] = true_shape(meshes, clean, rng)
+            true_object = scene.object(object_id)
+            meshes = close_truth(true_object, plan.data_root, plan.cache)
+            shape = true_shape(meshes, clean, rng)
+            surface = true_surface(shape.mesh.measured, clean, object_id, scene.name, plan.seed)
+            size = half_extent(meshes.exact.vertices, true_object.T_world_object)
+            truths[object_id] = Truth(shape, surface, size)
         except BrrpError as error:
             truths[object_id] = error
     return truths
@@ -158,7 +179,7 @@ def _row(
     variant: Variant,
     clean: Frame,
     object_id: int,
-    truths: dict[int, TrueShape | BrrpError],
+    truths: dict[int, Truth | BrrpError],
     found: dict[int, ObjectReconstruction] | BrrpError,
     memory: dict[str, RememberingRetriever],
     peak: float,
@@ -174,6 +195,11 @@ def _row(
         "peak_memory_mb": peak,
     }
     truth = truths[object_id]
+    if not isinstance(truth, BrrpError):
+        surface = truth.surface
+        row |= {"thickness": surface.thickness, "thickness_class": surface.thickness_class}
+        # What fails has no mesh, which counts.
+        row |= no_surface() if METHODS[variant.method].gives_shapes else {}
     if isinstance(found, BrrpError):
         return {**row, "status": FAILED, "message": str(found)}
     item = found.get(object_id)
@@ -186,16 +212,24 @@ def _row(
         row |= _retrieval(_prior(plan.prior).names, retriever, row["name"], item)
     if isinstance(truth, BrrpError):
         return {**row, "status": FAILED, "message": str(truth)}
+    if item.surface is not None:
+        mesh = item.surface.as_trimesh()
+        row |= score_written(mesh, truth.surface, scene.name, plan.seed)
     if item.posterior is not None:
         rng = child_rng(plan.seed, "score", scene.name, object_id)
-        scores, diagrams = score_probabilities(item.posterior, truth)
+        scores, diagrams = score_probabilities(item.posterior, truth.shape)
         level = variant.config.surface.level
-        row |= {**score_shape(item.posterior, truth, rng, level), **scores, "diagrams": diagrams}
+        shape = score_shape(item.posterior, truth.shape, rng, level)
+        row |= {**shape, **scores, "diagrams": diagrams}
+    if plan.prior is not None:
+        in_prior = row["name"] in _prior(plan.prior).names
+        row |= recognition(item, row["name"], in_prior, truth.half_extent)
     placed = [r for r in item.retrieved if r.T_cam_object is not None]
     if placed and plan.prior is not None:
-        row["placement_error"] = placement_error(
-            placed[0], _stored(plan.prior, placed[0].name), truth
-        )
+        # Without weights, the most probable.
+        best = max(placed, key=lambda each: each.weight or 0.0)
+        stored = _stored(plan.prior, best.name)
+        row["placement_error"] = placement_error(best, stored, truth.shape)
     return row
 
 

@@ -33,7 +33,7 @@ from brrp_cli.methods.config_file import read_config
 from brrp_cli.methods.registry import METHODS
 from brrp_cli.prior.store import Prior
 from brrp_cli.progress import progress
-from brrp_cli.retrieval.choose import USE_APPEARANCE, USE_CLIP, resolve_name
+from brrp_cli.retrieval.choose import USE_CLIP, resolve_name
 from brrp_cli.retrieval.clip.model_files import clip_folder, need_clip_folder
 from brrp_cli.stop import stopped
 from brrp_cli.threads import cores
@@ -91,7 +91,7 @@ def evaluate(request: Request, say: Callable[[str], None] = lambda text: None) -
         request.methods,
         request.presets,
         request.ks,
-        [resolve_name(name, request.clip_dir, opened) for name in request.retrievers],
+        [resolve_name(name, request.clip_dir) for name in request.retrievers],
         request.shifts,
         list(weights),
         [read_config(path) for path in request.configs],
@@ -225,18 +225,13 @@ def _prior(request: Request) -> Prior | None:
 
 
 def _check_prior(prior: Prior | None, variants: Sequence[Variant]) -> None:
-    """What a variant lacks in the prior is told now, not in every row. Errors: PriorError,
-    RetrievalError."""
-    from brrp_cli.retrieval.appearance import need_appearance
-
+    """What a variant lacks in the prior is told now, not in every row. Errors: PriorError."""
     if prior is None:
         return
     for variant in variants:
         check_prior = METHODS[variant.method].check_prior
         if check_prior is not None:
             check_prior(prior, variant.config)
-        if variant.retriever in USE_APPEARANCE:
-            need_appearance(prior)
 
 
 def _prepare_clip(prior: Prior | None, folder: Path) -> None:

@@ -17,15 +17,18 @@ from typing import Any, BinaryIO
 
 from filelock import FileLock
 
+from brrp_cli.evaluation.recognition import RECOGNITION
 from brrp_cli.evaluation.score_object import PROBABILITY_METRICS, REGIONS, SHAPE_METRICS
 from brrp_cli.evaluation.variants import Variant
 from brrp_cli.files import cannot_write, parse_json, write_bytes
+from brrp_cli.ground_truth.surface_metrics import SURFACE_METRICS
 
 Row = dict[str, Any]
 
 VARIANT = ("method", "preset", "k", "retriever", "weights", "shift")
 OBJECT = ("scene", "view", "object_id", "name", "visible_pixels", "objects_in_view")
 METRICS = (
+    *SURFACE_METRICS,
     *SHAPE_METRICS,
     *(f"{metric}_{region}" for region in REGIONS for metric in PROBABILITY_METRICS),
 )
@@ -33,6 +36,8 @@ RESULT = (
     "status",
     "message",
     "points",
+    "thickness",
+    "thickness_class",
     *METRICS,
     "in_prior",
     "not_in_prior",
@@ -42,6 +47,7 @@ RESULT = (
     "best_probability",
     "placed",
     "placement_error",
+    *RECOGNITION,
 )
 STAGES = ("observation", "retrieval", "registration", "inference", "surface")
 COST = (*(f"seconds_{stage}" for stage in STAGES), "seconds_total", "peak_memory_mb")
@@ -100,9 +106,8 @@ def _row(line: bytes) -> Row | None:
 
 
 def variant_of(row: Mapping[str, Any]) -> Variant:
-    """The variant that a row belongs to; rows of an older brrp have no weights."""
-    found: dict[str, Any] = {name: row.get(name) for name in VARIANT}
-    return Variant(**found)
+    """The variant that a row belongs to."""
+    return Variant(**{name: row[name] for name in VARIANT})
 
 
 def variant_columns(variant: Variant) -> Row:

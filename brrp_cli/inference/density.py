@@ -50,14 +50,18 @@ def mean_bce(weights: Tensor, samples: Samples) -> tuple[Tensor, Tensor]:
     return loss, residual @ samples.phi
 
 
-def logistic_score(weights: Tensor, phi: Factors, labels: Tensor, mean: Tensor) -> Tensor:
+def logistic_score(
+    weights: Tensor, phi: Factors, labels: Tensor, mean: Tensor, counted: Tensor
+) -> Tensor:
     """Gradient (P, D) of the mean binary cross-entropy of logits mean + w . phi, without a bias.
 
     weights : (P, D), the first of each, the bias, not used; phi : of n points; labels : (n,);
-    mean : (P, n), a logit of each particle's own. The first column of the gradient is 0.
+    mean : (P, n), a logit of each particle's own; counted : (P, n), 0 for points that have no say
+    in a particle. The first column of the gradient is 0.
     """
     logits = mean + phi.dot(weights[:, 1:])
-    gradient = phi.transpose_dot((torch.sigmoid(logits) - labels) / logits.shape[-1])
+    residual = counted * (torch.sigmoid(logits) - labels) / logits.shape[-1]
+    gradient = phi.transpose_dot(residual)
     return pad(gradient, (1, 0))
 
 

@@ -42,10 +42,18 @@ def cubic_grid(per_axis: int, half_width: float, floor: float) -> HingeGrid:
 
 
 def axis_factors(coordinates: Tensor, grid: HingeGrid, axis: int) -> Tensor:
-    """Kernels along one axis (..., counts[axis]) of coordinates (...), metres from the centre."""
+    """Kernels along one axis (..., counts[axis]) of coordinates (...), metres from the centre.
+
+    One under the grid's floor is 0, since no product with it reaches the floor either. Products of
+    three small kernels would be denormal numbers, which some processors multiply 20 times slower.
+    """
     steps = torch.arange(grid.counts[axis], dtype=coordinates.dtype, device=coordinates.device)
     hinges = grid.lower[axis] + grid.spacing * steps
-    return torch.exp(-(((coordinates[..., None] - hinges) / grid.spacing) ** 2))
+    exponent = -(((coordinates[..., None] - hinges) / grid.spacing) ** 2)
+    # Held a little below the floor, so that not even what is cut is denormal.
+    least = math.log(max(torch.finfo(torch.float32).tiny, grid.floor)) - 1
+    kernel = torch.exp(exponent.clamp_(min=least))
+    return torch.where(kernel < grid.floor, 0.0, kernel)
 
 
 def features(points: Tensor, grid: HingeGrid) -> Tensor:
@@ -61,8 +69,9 @@ def features(points: Tensor, grid: HingeGrid) -> Tensor:
 class Factors:
     """phi of points (n,) as a product: `first` (n, nx) along x, `rest` (n, ny * nz) of the others.
 
-    A tenth of the numbers of phi, and all that products with it need. Only the floor is left out,
-    which changes a logit by at most floor * |w|_1, and so is the bias.
+    A tenth of the numbers of phi, and all that products with it need. The floor holds along each
+    axis and not for the product, which changes a logit by at most floor * |w|_1; the bias is left
+    out.
     """
 
     first: Tensor
@@ -94,8 +103,8 @@ def factors(points: Tensor, grid: HingeGrid) -> Factors:
 def grid_logits(weights: Tensor, axes: tuple[Tensor, Tensor, Tensor], grid: HingeGrid) -> Tensor:
     """w . phi on a whole grid: (P, nx, ny, nz) for weights (P, H + 1) and its three axes.
 
-    Contracts one axis after the other and never forms a feature. Only the floor is left out, which
-    changes a logit by at most floor * |w|_1.
+    Contracts one axis after the other and never forms a feature. The floor holds along each axis
+    and not for the product, which changes a logit by at most floor * |w|_1.
     """
     shape = (weights.shape[0], *grid.counts)
     x, y, z = (axis_factors(each, grid, axis) for axis, each in enumerate(axes))

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, ClassVar, Protocol
 
 import numpy as np
+import torch
 from numpy.typing import NDArray
 
-from brrp_cli.inference.posterior import HilbertPosterior, mean_occupancy, occupancy
-from brrp_cli.inference.prior_mean import PriorMeanGrid
+from brrp_cli.inference.mean_grid import MeanGrid
+from brrp_cli.inference.placed_shape import PlacedShape
+from brrp_cli.inference.posterior import HilbertPosterior
 from brrp_cli.reconstruction import METRES, Axes
 
 if TYPE_CHECKING:
@@ -19,44 +21,107 @@ if TYPE_CHECKING:
 
 # Standard deviation of the logistic distribution over 4: a surface whose occupancy is a logistic
 # function of the way across it has this over the gradient as standard deviation of its place.
-LOGISTIC = np.pi / np.sqrt(3) / 4
+LOGISTIC_DEVIATION = np.pi / np.sqrt(3) / 4
 # No surface is less certain than this, metres.
 LARGEST = 0.05
 # Half of the difference quotients' step, metres.
 STEP = 0.001
 
 
+class MeanFunction(Protocol):
+    """What a hypothesis says before the observation corrects it: a logit of occupancy m(x).
+
+    kind : what a file calls the class
+    """
+
+    kind: ClassVar[str]
+
+    @property
+    def bounds(self) -> NDArray[np.float64]:
+        """(2, 3) metres, camera frame: the box that holds its shape."""
+
+    def logits(self, points: NDArray[np.floating]) -> NDArray[np.float32]:
+        """m (n,) at points (n, 3), metres, camera frame."""
+
+    def volume(self, axes: Axes) -> NDArray[np.float32]:
+        """m (nx, ny, nz) on a grid of camera-frame coordinates, metres."""
+
+    def write(self, group: h5py.Group, shared: SharedParts) -> None:
+        """Into a group of its own."""
+
+
 @dataclass(frozen=True)
 class HypothesisPosterior:
     """Particles (hypothesis, weights) over sigmoid(m(x) + w . phi(x)).
 
-    mean : m of C hypotheses; which : (P,) the hypothesis of each particle; correction : the
-    particles' weights
+    means : m of C hypotheses; which : (P,) the hypothesis of each particle; shares : (P,), sum 1,
+    the weight of each particle; correction : the particles' weights w; box : (2, 3) metres, camera
+    frame, outside of which nothing is occupied
     """
 
     kind: ClassVar[str] = "hypotheses"
 
-    mean: PriorMeanGrid
+    means: tuple[MeanFunction, ...]
     which: NDArray[np.int64]
+    shares: NDArray[np.float64]
     correction: HilbertPosterior
+    box: NDArray[np.float64]
 
     @property
     def bounds(self) -> NDArray[np.float64]:
-        """(2, 3) metres, camera frame: the grid's box, outside of which nothing is occupied."""
-        return np.stack([self.mean.lower, self.mean.upper])
+        """(2, 3) metres, camera frame."""
+        return self.box
+
+    @property
+    def weights(self) -> NDArray[np.float64]:
+        """(C,) weight of each hypothesis, sum 1."""
+        return np.bincount(self.which, self.shares, len(self.means)).astype(np.float64)
+
+    @property
+    def dominant(self) -> int | None:
+        """The placed shape that explains the object: the most probable placement, if placements of
+        its object together weigh more than a half."""
+        of: dict[str, float] = {}
+        for mean, weight in zip(self.means, self.weights, strict=True):
+            if isinstance(mean, PlacedShape):
+                of[mean.name] = of.get(mean.name, 0.0) + float(weight)
+        best = max(of, key=lambda name: of[name], default=None)
+        if best is None or of[best] <= 0.5:
+            return None
+        mine = [isinstance(m, PlacedShape) and m.name == best for m in self.means]
+        return int(np.argmax(np.where(mine, self.weights, -1)))
 
     def logits(self, points: NDArray[np.floating]) -> NDArray[np.float32]:
         """m + w . phi (P, n) at points (n, 3), metres, camera frame."""
-        return self.mean.logits(points)[self.which] + self.correction.logits(points)
+        means = np.stack([mean.logits(points) for mean in self.means])
+        return np.asarray(means[self.which] + self.correction.logits(points))
 
     def probability(self, points: NDArray[np.floating]) -> NDArray[np.float32]:
-        """Occupancy probability (n,): mean over particles of sigmoid(m + w . phi)."""
-        return mean_occupancy(self.logits(points))
+        """Occupancy probability (n,): mean over particles of sigmoid(m + w . phi); 0 out of
+        bounds."""
+        points = np.asarray(points)
+        inside = ((points >= self.box[0]) & (points <= self.box[1])).all(axis=1)
+        found = np.zeros(len(points), np.float32)
+        found[inside] = self.mean_occupancy(self.logits(points[inside]))
+        return found
 
     def probability_volume(self, axes: Axes) -> NDArray[np.float32]:
         """Occupancy probability (nx, ny, nz) on a grid of camera-frame coordinates, metres."""
-        logits = self.mean.volume(axes)[self.which] + self.correction.logit_volume(axes)
-        return mean_occupancy(logits)
+        return np.tensordot(self.shares, self.particle_volumes(axes), axes=1).astype(np.float32)
+
+    def particle_volumes(self, axes: Axes) -> NDArray[np.float32]:
+        """Occupancy (P, nx, ny, nz) of each particle on a grid of camera-frame coordinates,
+        metres."""
+        logits = self.correction.logit_volume(axes)
+        for number, mean in enumerate(self.means):
+            logits[self.which == number] += mean.volume(axes)
+        return np.asarray(torch.from_numpy(logits).sigmoid_().numpy())
+
+    def mean_occupancy(self, logits: NDArray[np.floating]) -> NDArray[np.float32]:
+        """Weighted mean over particles of sigmoid(logits), for logits (P, ...)."""
+        occupancy = torch.sigmoid(torch.from_numpy(np.asarray(logits, dtype=np.float32)))
+        shares = torch.from_numpy(self.shares.astype(np.float32))
+        return np.asarray(torch.tensordot(shares, occupancy, dims=1).numpy())
 
     def uncertainty(self, points: NDArray[np.floating]) -> NDArray[np.float32]:
         """Variance (n,) of occupancy, p (1 - p): at most 0.25, between the hypotheses' surfaces."""
@@ -73,42 +138,49 @@ class HypothesisPosterior:
 
         Occupancy falls from 1 to 0 across a surface: the more slowly, the less is known where.
         """
-        slope = [
+        gradient = [
             (self.probability(vertices + step) - self.probability(vertices - step)) / (2 * STEP)
             for step in np.eye(3) * STEP
         ]
-        steepness = np.maximum(np.linalg.norm(slope, axis=0), LOGISTIC / LARGEST)
-        return np.asarray(LOGISTIC / steepness, dtype=np.float32)
-
-    def particle_volumes(self, axes: Axes) -> NDArray[np.float32]:
-        """Occupancy probability (P, nx, ny, nz) of each particle on a grid."""
-        return occupancy(self.mean.volume(axes)[self.which] + self.correction.logit_volume(axes))
+        return deviation(np.linalg.norm(gradient, axis=0))
 
     def write(self, group: h5py.Group, shared: SharedParts) -> None:
-        """The correction as its class writes it, and attributes mean_lower (3), mean_spacing,
-        outside; mean (C, nx, ny, nz) float16, logits; which (P,) int64."""
+        """The correction as its class writes it, and which (P,) int64, shares (P,) float64, box (2,
+        3), means/0, 1, ... as their classes write them, with their kind."""
         self.correction.write(group, shared)
-        group.attrs["mean_lower"] = self.mean.lower
-        group.attrs["mean_spacing"] = self.mean.spacing
-        group.attrs["outside"] = self.mean.outside
-        group.create_dataset(
-            "mean",
-            data=self.mean.values,
-            chunks=(1, *self.mean.values.shape[1:]),
-            compression="gzip",
-            shuffle=True,
-            fletcher32=True,
-        )
-        group.create_dataset("which", data=self.which, chunks=self.which.shape, fletcher32=True)
+        group.attrs["box"] = self.box
+        for name, values in (("which", self.which), ("shares", self.shares)):
+            group.create_dataset(name, data=values, chunks=values.shape, fletcher32=True)
+        for number, mean in enumerate(self.means):
+            part = group.create_group(f"means/{number}")
+            part.attrs["kind"] = mean.kind
+            mean.write(part, shared)
 
     @classmethod
     def read(cls, group: h5py.Group, shared: SharedParts) -> HypothesisPosterior:
         """What `write` wrote. Errors: KeyError, ValueError."""
-        mean = PriorMeanGrid(
-            lower=np.asarray(group.attrs["mean_lower"], dtype=np.float64),
-            spacing=float(group.attrs["mean_spacing"]),
-            values=np.asarray(group["mean"], dtype=np.float16),
-            outside=float(group.attrs["outside"]),
-        )
+        parts = [group[f"means/{number}"] for number in range(len(group["means"]))]
+        means = tuple(_KINDS[part.attrs["kind"]].read(part, shared) for part in parts)
         which = np.asarray(group["which"], dtype=np.int64)
-        return HypothesisPosterior(mean, which, HilbertPosterior.read(group, shared))
+        shares = np.asarray(group["shares"], dtype=np.float64)
+        if not len(which) or which.min() < 0 or which.max() >= len(means):
+            raise ValueError(f"particles of hypotheses that are not there: {which.tolist()}")
+        return HypothesisPosterior(
+            means,
+            which,
+            shares,
+            HilbertPosterior.read(group, shared),
+            np.asarray(group.attrs["box"], dtype=np.float64),
+        )
+
+
+_KINDS: dict[str, type[MeanGrid] | type[PlacedShape]] = {
+    each.kind: each for each in (MeanGrid, PlacedShape)
+}
+
+
+def deviation(steepness: NDArray[np.floating]) -> NDArray[np.float32]:
+    """Standard deviation (n,), metres, of the place of a surface across which occupancy falls by
+    `steepness` (n,), 1/metre."""
+    steepest = np.maximum(steepness, LOGISTIC_DEVIATION / LARGEST)
+    return np.asarray(LOGISTIC_DEVIATION / steepest, dtype=np.float32)

@@ -3,8 +3,10 @@
     ln p(w | hypothesis) = - lambda_observed * mean_i BCE(y_i, m(x_i) + w . phi(x_i))
                            - lambda_norm * |w|^2
 
-Particles are shared out among the hypotheses in proportion to their weights, so that the spread of
-the particles holds what is not known of identity and pose, besides what was not seen.
+y_i is the probability that x_i is occupied, given what the sensor measured and how far it errs: a
+sample within the sensor's noise of the surface says little. Each hypothesis has the weight that
+verification gave it, whatever number of particles describes it, and a posterior of its own over w:
+SVGD runs for its particles by themselves.
 """
 
 from __future__ import annotations
@@ -19,27 +21,41 @@ from torch import Tensor
 from brrp_cli.config import FittedMapConfig
 from brrp_cli.inference.density import logistic_score
 from brrp_cli.inference.hinge import HingeGrid, factors
-from brrp_cli.inference.hypothesis_posterior import HypothesisPosterior
-from brrp_cli.inference.infer import LabelledPoints
+from brrp_cli.inference.hypothesis_posterior import HypothesisPosterior, MeanFunction
+from brrp_cli.inference.placed_shape import PlacedShape
 from brrp_cli.inference.posterior import HilbertPosterior
-from brrp_cli.inference.prior_mean import PriorMeanGrid
-from brrp_cli.inference.svgd import run_svgd
+from brrp_cli.inference.svgd import groups_of, run_svgd
 from brrp_cli.seeds import child_seed
 
 Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
+class SoftSamples:
+    """points : (n, 3), metres, camera frame; targets : (n,) probability of being occupied;
+    measured : (n, 3), the point of the seen surface that a sample comes from, NaN for free
+    space."""
+
+    points: Array
+    targets: Array
+    measured: Array
+
+
+@dataclass(frozen=True)
 class Problem:
     """What is to be inferred.
 
-    observed : samples near the object; mean : C prior means; which : (P,) the one of each particle;
-    box : (2, 3), metres, camera frame, what was seen and the hypotheses' shapes
+    observed : samples near the object; means : of C hypotheses; weights : (C,), sum 1, of the
+    hypotheses; stiffness : (C,) factors of lambda_norm; noise : metres, a placed shape whose
+    surface lies so near to a measured point explains it; box : (2, 3), metres, camera frame, what
+    was seen and the hypotheses' shapes
     """
 
-    observed: LabelledPoints
-    mean: PriorMeanGrid
-    which: NDArray[np.int64]
+    observed: SoftSamples
+    means: tuple[MeanFunction, ...]
+    weights: Array
+    stiffness: Array
+    noise: float
     box: Array
 
 
@@ -49,41 +65,68 @@ def infer_correction(
     """Particles over the weights. The same seed gives the same particles."""
     center = problem.box.mean(axis=0)
     grid = box_grid(problem.box - center, config)
-    which = problem.which
-    samples = _inside(_behind(problem.observed, config.behind), problem.box, grid.spacing)
+    which, shares = particles_of(problem.weights, config.particles)
+    samples = _inside(problem.observed, problem.box, grid.spacing)
     points = torch.from_numpy((samples.points - center).astype(np.float32)).to(device)
     phi = factors(points, grid)
-    labels = torch.from_numpy(samples.labels.astype(np.float32)).to(device)
-    mean = torch.from_numpy(problem.mean.logits(samples.points)[which]).to(device)
+    targets = torch.from_numpy(samples.targets.astype(np.float32)).to(device)
+    means = np.stack([mean.logits(samples.points) for mean in problem.means])[which]
+    mean = torch.from_numpy(means).to(device)
+    counted = torch.from_numpy(
+        np.stack([_counted(m, samples, problem.noise) for m in problem.means])
+    )
+    counted = counted.to(device)[torch.from_numpy(which).to(device)]
+    stiffness = torch.from_numpy(problem.stiffness[which].astype(np.float32)).to(device)[:, None]
     generator = torch.Generator().manual_seed(child_seed(seed, "correction"))
 
     def score(weights: Tensor, step: int) -> Tensor:
-        norm = -2 * config.lambda_norm * weights
-        if not len(labels):
+        norm = -2 * config.lambda_norm * stiffness * weights
+        if not len(targets):
             return norm
-        rows = torch.randint(len(labels), (config.batch,), generator=generator).to(device)
+        rows = torch.randint(len(targets), (config.batch,), generator=generator).to(device)
         return norm - config.lambda_observed * logistic_score(
-            weights, phi.rows(rows), labels[rows], mean[:, rows]
+            weights, phi.rows(rows), targets[rows], mean[:, rows], counted[:, rows]
         )
 
     start = config.start * torch.randn(len(which), grid.dimension, generator=generator)
     start[:, 0] = 0
+    start = start.to(device) / stiffness.sqrt()
     weights = run_svgd(
-        start.to(device), score, steps=config.steps, learning_rate=config.learning_rate
+        start,
+        score,
+        steps=config.steps,
+        learning_rate=config.learning_rate,
+        groups=groups_of(torch.from_numpy(which).to(device)),
     )
     reach = float((problem.box[1] - problem.box[0]).max() / 2)
     correction = HilbertPosterior(weights.cpu().numpy(), center, grid, reach)
-    return HypothesisPosterior(problem.mean, which, correction)
+    return HypothesisPosterior(problem.means, which, shares, correction, problem.box)
 
 
-def systematic_resampling(weights: Array, particles: int) -> NDArray[np.int64]:
-    """Hypothesis (P,) of each particle: systematic resampling, in the order of the hypotheses.
+def _counted(mean: MeanFunction, samples: SoftSamples, noise: float) -> NDArray[np.float32]:
+    """1 for each sample (n,) that has a say, 0 for those of the seen surface that a placed shape
+    explains to within the noise: the placement has been fitted to them, and behind a thin wall they
+    would be taken for its inside."""
+    counted = np.ones(len(samples.points), np.float32)
+    seen = np.flatnonzero(np.isfinite(samples.measured[:, 0]))
+    if isinstance(mean, PlacedShape) and len(seen):
+        distance = mean.signed_distance(samples.measured[seen], noise)
+        counted[seen] = np.abs(distance) > noise
+    return counted
 
-    Each of the weights (C,), sum 1, gets its share rounded up or down.
+
+def particles_of(weights: Array, particles: int) -> tuple[NDArray[np.int64], Array]:
+    """Hypothesis (P,) and share (P,) of each particle, for weights (C,), sum 1, none of them 0.
+
+    Every hypothesis has one particle at least, so that P is C where there are more hypotheses than
+    `particles`; the others go one by one to the hypothesis whose particles weigh most. A particle
+    weighs what its hypothesis does, divided by the number of its particles.
     """
-    at = (np.arange(particles) + 0.5) / particles
-    found = np.searchsorted(np.cumsum(weights), at)
-    return np.minimum(found, len(weights) - 1).astype(np.int64)
+    counts = np.ones(len(weights), dtype=np.int64)
+    for _ in range(particles - len(weights)):
+        counts[np.argmax(weights / counts)] += 1
+    which = np.repeat(np.arange(len(weights)), counts)
+    return which, (weights / counts)[which]
 
 
 def box_grid(box: Array, config: FittedMapConfig) -> HingeGrid:
@@ -98,17 +141,8 @@ def box_grid(box: Array, config: FittedMapConfig) -> HingeGrid:
     return HingeGrid((x, y, z), (nx, ny, nz), spacing, config.feature_floor)
 
 
-def _behind(observed: LabelledPoints, distance: float) -> LabelledPoints:
-    """Occupied samples moved away from the camera: a point on the surface is as much outside as
-    inside, and taken for inside it would make every object thicker."""
-    points = np.asarray(observed.points, dtype=np.float64).copy()
-    seen = points[observed.labels]
-    points[observed.labels] = seen * (1 + distance / np.linalg.norm(seen, axis=1, keepdims=True))
-    return LabelledPoints(points, observed.labels)
-
-
-def _inside(samples: LabelledPoints, box: Array, margin: float) -> LabelledPoints:
+def _inside(samples: SoftSamples, box: Array, margin: float) -> SoftSamples:
     """The samples that hinge points can reach."""
     points = samples.points
     kept = ((points > box[0] - margin) & (points < box[1] + margin)).all(axis=1)
-    return LabelledPoints(points[kept], samples.labels[kept])
+    return SoftSamples(points[kept], samples.targets[kept], samples.measured[kept])

@@ -7,22 +7,16 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from brrp_cli.completion.visible_part import visible_part
-from brrp_cli.config import Config, HypothesesConfig, MeanConfig, WeighConfig
+from brrp_cli.completion.completed_mean import completed_grid, empty_space
+from brrp_cli.completion.visible_part import VisiblePart, visible_part
+from brrp_cli.config import Config, FittedMapConfig, HypothesesConfig, MeanConfig, WeighConfig
 from brrp_cli.frames.frame import Frame
-from brrp_cli.geometry import transform_points
-from brrp_cli.inference.hypothesis_posterior import HypothesisPosterior
-from brrp_cli.inference.infer import LabelledPoints
-from brrp_cli.inference.infer_hypotheses import Problem, infer_correction, systematic_resampling
-from brrp_cli.inference.prior_mean import (
-    PriorMeanGrid,
-    completed_grid,
-    empty_space,
-    grid_over,
-    shape_logits,
-)
-from brrp_cli.methods.check_prior import no_distances
+from brrp_cli.inference.hypothesis_posterior import HypothesisPosterior, MeanFunction
+from brrp_cli.inference.infer_hypotheses import Problem, SoftSamples, infer_correction
+from brrp_cli.inference.mean_grid import MeanGrid, grid_over
+from brrp_cli.inference.placed_shape import PlacedShape
 from brrp_cli.observation.ray_samples import ObjectObservation
+from brrp_cli.observation.soft_samples import depth_deviation, soft_samples
 from brrp_cli.observation.support_plane import Plane
 from brrp_cli.prior.store import Prior
 from brrp_cli.reconstruction import OK, ObjectReconstruction, Retrieved
@@ -136,62 +130,69 @@ def _infer(
     seed: int,
     device: str,
 ) -> HypothesisPosterior:
-    """Only hypotheses that a particle gets cost a mean function."""
-    kept, which = np.unique(
-        systematic_resampling(weights, config.map.particles), return_inverse=True
-    )
+    """Only hypotheses that weigh something cost a mean function."""
+    kept = _kept(weights, config.map)
+    weights = weights[kept] / weights[kept].sum()
+    shapes = [_placed_shape(placed[i], config.mean) for i in kept if i < len(placed)]
     part = None
-    if len(placed) in kept:
+    if len(shapes) < len(kept):
         part = visible_part(
             observation.points, frame, observation.object_id, plane, config.completion
         )
-    extent = np.concatenate(
-        [observation.points]
-        + [_surface(placed[i]) for i in kept if i < len(placed)]
-        + ([] if part is None else [part.extent])
-    )
+    extents: list[Array] = [observation.points.astype(np.float64)]
+    extents += [shape.bounds for shape in shapes]
+    extents += [] if part is None else [part.extent]
+    extent = np.concatenate(extents)
     margin = config.map.margin
     box = np.stack([extent.min(axis=0) - margin, extent.max(axis=0) + margin])
-    lower, spacing, nodes = grid_over(box, config.mean)
-    empty = empty_space(nodes.reshape(-1, 3), frame, observation.object_id, plane, config.mean)
-    empty = empty.reshape(nodes.shape[:3])
-    mean = [
-        completed_grid(nodes, empty, part, config.mean)
-        if part is not None and i == len(placed)
-        else _placed_grid(nodes, empty, placed[i], config.mean)
-        for i in kept
-    ]
-    grid = PriorMeanGrid(lower, spacing, np.stack(mean), outside=-config.mean.limit)
+    means: list[MeanFunction] = list(shapes)
+    if part is not None:
+        means.append(_completed(part, box, frame, observation.object_id, plane, config.mean))
+    stiffness = np.ones(len(means))
+    stiffness[: len(shapes)] = config.map.stiffness
+    points, targets, measured = soft_samples(observation, frame, config.map.behind, config.sensor)
+    noise = config.sensor.sure * depth_deviation(observation.center[2:], config.sensor)[0]
     return infer_correction(
-        Problem(LabelledPoints(observation.samples, observation.labels), grid, which, box),
+        Problem(
+            SoftSamples(points, targets, measured), tuple(means), weights, stiffness, noise, box
+        ),
         config.map,
         seed=child_seed(seed, observation.object_id),
         device=device,
     )
 
 
-def _placed_grid(
-    nodes: Array, empty: NDArray[np.bool_], hypothesis: Hypothesis, config: MeanConfig
-) -> NDArray[np.float16]:
-    """Logits (nx, ny, nz) of a placed shape at nodes (nx, ny, nz, 3), but where it is empty."""
-    logits = np.full(empty.shape, -config.limit, np.float16)
-    distance = _distance(hypothesis, nodes[~empty])
-    logits[~empty] = shape_logits(distance, hypothesis.alignment_score, config)
-    return logits
+def _kept(weights: Array, config: FittedMapConfig) -> NDArray[np.int64]:
+    """The hypotheses that weigh `config.least_weight`, the heaviest of them where there are more
+    than particles, in their order."""
+    order = np.argsort(-weights, kind="stable")[: config.particles]
+    return np.sort(order[(weights[order] >= config.least_weight) | (np.arange(len(order)) == 0)])
 
 
-def _surface(hypothesis: Hypothesis) -> Array:
-    return np.asarray(transform_points(hypothesis.T_cam_model, hypothesis.model.surface))
-
-
-def _distance(hypothesis: Hypothesis, points: Array) -> Array:
-    """Signed distance (n,), metres, of points (n, 3), camera frame, to the placed shape."""
+def _placed_shape(hypothesis: Hypothesis, config: MeanConfig) -> PlacedShape:
+    """The less the frame says for the placement, the softer its surface."""
     stored = hypothesis.model.stored
-    if stored.distances is None:
-        raise no_distances(stored.name)
-    T_object_cam = np.linalg.inv(hypothesis.T_cam_object)
-    unit = stored.half_extent * hypothesis.scale
-    return stored.distances.signed_distance(transform_points(T_object_cam, points)) * unit
+    return PlacedShape(
+        stored.name,
+        stored.shape,
+        hypothesis.T_cam_object,
+        config.width + config.doubt * max(0.0, config.sure - hypothesis.alignment_score),
+        config.limit,
+    )
+
+
+def _completed(
+    part: VisiblePart,
+    box: Array,
+    frame: Frame,
+    object_id: int,
+    plane: Plane | None,
+    config: MeanConfig,
+) -> MeanGrid:
+    lower, spacing, nodes = grid_over(box, config.nodes)
+    empty = empty_space(nodes.reshape(-1, 3), frame, object_id, plane, config)
+    logits = completed_grid(nodes, empty.reshape(nodes.shape[:3]), part, config)
+    return MeanGrid(lower, spacing, logits, outside=-config.limit)
 
 
 def _shuffled(points: NDArray[np.float32], seed: int, object_id: int) -> Array:
@@ -205,10 +206,12 @@ def _retrieved(name: str, probability: float, group: list[Hypothesis], weight: f
     if not group:
         return Retrieved(name, probability, weight=weight)
     best = group[0]
+    T_cam_mesh, _ = best.model.stored.mesh_pose(best.T_cam_object)
     return Retrieved(
         name,
         probability,
         best.T_cam_object,
+        T_cam_mesh,
         best.scale,
         alignment_score=best.alignment_score,
         weight=weight,

@@ -12,8 +12,7 @@ from brrp_cli.prior.store import Prior
 
 
 def check_prior(prior: Prior, config: Config) -> None:
-    """PriorError unless the prior's clouds and features were made as `config` makes them, and
-    distances are there if it asks for them."""
+    """PriorError unless the prior's clouds and features were made as `config` makes them."""
     # As JSON gives it back: tuples are lists.
     wanted = json.loads(json.dumps(asdict(config.features)))
     features = prior.parameters.get("features")
@@ -25,16 +24,3 @@ def check_prior(prior: Prior, config: Config) -> None:
             found="; ".join(lines),
             fix="build the prior anew, or use the configuration that it was built for",
         )
-    if config.hypotheses is not None and "distances" not in prior.parameters:
-        raise no_distances(prior.path)
-
-
-def no_distances(where: object) -> PriorError:
-    """The message for a prior, or an object of one, that an older brrp built."""
-    return PriorError(
-        "The prior holds no distances to its objects' surfaces",
-        where=where,
-        expected="a prior of this version of brrp",
-        found="one that an older brrp built",
-        fix="run brrp build-prior MESHES --overwrite, or pass --preset paper",
-    )

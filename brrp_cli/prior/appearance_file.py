@@ -2,7 +2,7 @@
 
 `appearance-KEY.npy` is a structured array, one row for each object in the order of their names. It
 holds nothing that the shards do not: where it is missing or damaged, it is made again from them, to
-the same bytes. looks.py reads the rows that are looked at.
+the same bytes. appearance_index.py reads the rows that are looked at.
 """
 
 from __future__ import annotations
@@ -91,7 +91,6 @@ def restore_sidecar(folder: Path, manifest: Manifest) -> NDArray[Any]:
     cannot be written. Errors: PriorError if the shards have other descriptors than the manifest
     says."""
     entry = manifest.appearance
-    assert entry is not None
     path = folder / entry.file
     log.warning("%s is missing or damaged; it is made again from the shards", path)
     try:

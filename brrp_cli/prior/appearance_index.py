@@ -1,7 +1,8 @@
 """The appearance of all objects, as retrieval reads it: a first look at all, the rest by row.
 
-`appearance-KEY.npz` lies beside the descriptors of the same key (see sidecar.py), which are 8 kB
-for each object, and holds 0.4 kB of each: what a first look compares, and a checksum of the row.
+`appearance-KEY.npz` lies beside the descriptors of the same key (see appearance_file.py), which are
+8 kB for each object, and holds 0.4 kB of each: what a first look compares, and a checksum of the
+row.
 So neither a start nor a lookup reads the whole of the descriptors, and no row that is damaged is
 used. Where the file is missing, damaged or of other descriptors, it is made again.
 
@@ -66,11 +67,6 @@ class AppearanceIndex:
         return len(self.first.colour)
 
 
-def looks_of(table: NDArray[Any]) -> AppearanceIndex:
-    """Of descriptors (n,) that are at hand."""
-    return AppearanceIndex(first_look(table), lambda rows: np.asarray(table[rows]))
-
-
 def first_look(table: NDArray[Any]) -> AppearanceSummary:
     """Of descriptors (n,)."""
     parts = [
@@ -82,15 +78,13 @@ def first_look(table: NDArray[Any]) -> AppearanceSummary:
 
 def open_appearance_index(
     folder: Path, index: Index, manifest: Callable[[], Manifest]
-) -> AppearanceIndex | None:
-    """The appearance of a prior's objects; None where colours cannot be read.
+) -> AppearanceIndex:
+    """The appearance of a prior's objects.
 
     manifest : asked for only where descriptors have to be made again from the shards. Errors:
     PriorError.
     """
     entry = index.appearance
-    if entry is None:
-        return None
     rows = _Rows(folder, entry, row_type(index.parameters), len(index.names), manifest)
     first = _read(folder, entry, rows) if has_size(folder, entry) else None
     if first is None:

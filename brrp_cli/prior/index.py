@@ -41,7 +41,7 @@ class Index:
 
     digest: str
     parameters: dict[str, Any]
-    appearance: ShardEntry | None
+    appearance: ShardEntry
     shards: list[ShardEntry]
     names: list[str]
     descriptions: list[str]
@@ -58,7 +58,7 @@ class Index:
             "schema": SCHEMA,
             "digest": self.digest,
             "parameters": self.parameters,
-            "appearance": None if self.appearance is None else asdict(self.appearance),
+            "appearance": asdict(self.appearance),
             "shards": [astuple(shard) for shard in self.shards],
             "names": self.names,
             "descriptions": self.descriptions,
@@ -115,13 +115,9 @@ def _kept(folder: Path) -> Index | None:
             return None
         if table["digest"] != sha256_file(folder / FILE):
             return None
-        appearance = table.pop("appearance")
+        appearance = ShardEntry(**table.pop("appearance"))
         shards = [ShardEntry(*row) for row in table.pop("shards")]
-        index = Index(
-            appearance=None if appearance is None else ShardEntry(**appearance),
-            shards=shards,
-            **table,
-        )
+        index = Index(appearance=appearance, shards=shards, **table)
         check_files(index.shards, index.appearance)
         _check_columns(index)
     except (OSError, ValueError, KeyError, TypeError, AttributeError):

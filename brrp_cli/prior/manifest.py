@@ -2,10 +2,9 @@
 
 Keys: kind, schema, parameters, objects (sorted by name; each with name, description, source,
 input_sha256, shard, half_extent, record), shards (file, sha256, bytes), appearance (file, sha256,
-bytes; see sidecar.py), failed (name, source, reason), libraries (versions that the objects were
-made with), content_sha256 (of the file's bytes with zeros in its place; a manifest of an older brrp
-has none). Schema 1 had no appearance. No times and no absolute paths: the same seed and meshes
-give the same bytes.
+bytes; see appearance_file.py), failed (name, source, reason), libraries (versions that the objects
+were made with), content_sha256 (of the file's bytes with zeros in its place). No times and no
+absolute paths: the same seed and meshes give the same bytes.
 """
 
 from __future__ import annotations
@@ -76,26 +75,22 @@ class Manifest:
     objects: list[ObjectEntry]
     shards: list[ShardEntry]
     failed: list[Failure]
-    appearance: ShardEntry | None = None
+    appearance: ShardEntry
 
     def as_bytes(self) -> bytes:
         """The file's bytes."""
-        table = {
-            "kind": KIND,
-            # One that was read gives the bytes that it was read from.
-            "schema": 1 if self.appearance is None else SCHEMA,
-            "parameters": self.parameters,
-            "libraries": self.libraries,
-            "objects": [asdict(entry) for entry in self.objects],
-            "shards": [asdict(entry) for entry in self.shards],
-            "failed": [asdict(entry) for entry in self.failed],
-        }
-        if self.appearance is not None:
-            table["appearance"] = asdict(self.appearance)
-        table["content_sha256"] = _NOTHING
-        text = json.dumps(table, indent=1, ensure_ascii=False, sort_keys=True) + "\n"
-        key = '\n "content_sha256": "'
-        return text.replace(key + _NOTHING, key + _sum(text.encode()), 1).encode()
+        return with_own_sum(
+            {
+                "kind": KIND,
+                "schema": SCHEMA,
+                "parameters": self.parameters,
+                "libraries": self.libraries,
+                "objects": [asdict(entry) for entry in self.objects],
+                "shards": [asdict(entry) for entry in self.shards],
+                "failed": [asdict(entry) for entry in self.failed],
+                "appearance": asdict(self.appearance),
+            }
+        )
 
     @property
     def libraries(self) -> dict[str, list[str]]:
@@ -105,6 +100,14 @@ class Manifest:
             for library, version in entry.record.get("made_with", {}).items():
                 met.setdefault(library, set()).add(version)
         return {library: sorted(versions) for library, versions in sorted(met.items())}
+
+
+def with_own_sum(table: dict[str, Any]) -> bytes:
+    """The bytes of a manifest with these keys and its `content_sha256`."""
+    table = table | {"content_sha256": _NOTHING}
+    text = json.dumps(table, indent=1, ensure_ascii=False, sort_keys=True) + "\n"
+    key = '\n "content_sha256": "'
+    return text.replace(key + _NOTHING, key + _sum(text.encode()), 1).encode()
 
 
 def write_manifest(folder: Path, manifest: Manifest) -> None:
@@ -149,7 +152,7 @@ def parse_manifest(data: bytes, path: Path) -> Manifest:
             objects=[ObjectEntry(**entry) for entry in table["objects"]],
             shards=[ShardEntry(**entry) for entry in table["shards"]],
             failed=[Failure(**entry) for entry in table["failed"]],
-            appearance=ShardEntry(**table["appearance"]) if "appearance" in table else None,
+            appearance=ShardEntry(**table["appearance"]),
         )
         _check_text(manifest)
         check_files(manifest.shards, manifest.appearance)
@@ -164,10 +167,10 @@ def _sum(data: bytes) -> str:
 
 
 def _check_sum(data: bytes) -> None:
-    """ValueError if the manifest tells a sum of its own that it does not have."""
+    """ValueError unless the manifest has the sum that it states."""
     told = _OWN_SUM.search(data)
     if told is None:
-        return
+        raise ValueError("no content_sha256")
     start, end = told.span(1)
     if _sum(data[:start] + _NOTHING.encode() + data[end:]) != told[1].decode():
         raise ValueError("bytes that do not have the manifest's own sha256")
@@ -200,14 +203,14 @@ def _refuse_foreign(table: dict[str, Any], path: Path) -> None:
         )
 
 
-def check_files(shards: list[ShardEntry], appearance: ShardEntry | None) -> None:
+def check_files(shards: list[ShardEntry], appearance: ShardEntry) -> None:
     """ValueError for a file that is not where and how a prior keeps its files."""
     for shard in shards:
         if not SHARD_NAME.fullmatch(shard.file):
             raise ValueError(f"a shard named {shard.file!r}")
-    if appearance and not APPEARANCE_NAME.fullmatch(appearance.file):
+    if not APPEARANCE_NAME.fullmatch(appearance.file):
         raise ValueError(f"a file of descriptors named {appearance.file!r}")
-    for entry in [*shards, *([appearance] if appearance else [])]:
+    for entry in [*shards, appearance]:
         if not _SHA256.fullmatch(entry.sha256):
             raise ValueError(f"{entry.file} with the sum {entry.sha256!r}")
         if type(entry.bytes) is not int or not 0 <= entry.bytes <= MAX_SHARD_BYTES:

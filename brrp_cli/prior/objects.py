@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from brrp_cli.descriptors.descriptor import Appearance
 from brrp_cli.descriptors.fpfh import FeatureCloud
-from brrp_cli.prior.distance_field import DistanceField
+from brrp_cli.prior.shape import StoredShape
 
 
 @dataclass(frozen=True)
@@ -38,8 +38,8 @@ class PriorObject:
         base_scale * scale: metres, centred on the bounding box
     poses : resting poses, most probable first
     record : how it was made (repair, sample mix, original size); plain JSON
-    appearance : what it looks like; None in a prior of an older brrp
-    distances : signed distances to its surface, normalised; None in a prior of an older brrp
+    appearance : what it looks like
+    shape : its closed mesh with colours, and signed distances; normalised
     """
 
     name: str
@@ -53,5 +53,16 @@ class PriorObject:
     clouds: dict[float, FeatureCloud]
     poses: list[RestingPose]
     record: dict[str, Any]
-    appearance: Appearance | None = None
-    distances: DistanceField | None = None
+    appearance: Appearance
+    shape: StoredShape
+
+    def mesh_pose(self, T_cam_object: NDArray[np.float64]) -> tuple[NDArray[np.float64], float]:
+        """The rigid pose (4, 4) of the object's own mesh file, metres, and the factor of its size,
+        for T_cam_object (4, 4), a similarity from normalised coordinates."""
+        scale = float(np.cbrt(np.linalg.det(T_cam_object[:3, :3])))
+        factor = scale / self.half_extent
+        T_cam_mesh = np.eye(4)
+        T_cam_mesh[:3, :3] = T_cam_object[:3, :3] / scale
+        # x_object = (x_mesh - center) / half_extent
+        T_cam_mesh[:3, 3] = T_cam_object[:3, 3] - factor * T_cam_mesh[:3, :3] @ self.center
+        return T_cam_mesh, factor

@@ -13,13 +13,14 @@ from brrp_cli.descriptors.fpfh import FeatureCloud
 from brrp_cli.geometry import normalise
 from brrp_cli.prior.distance_field import DistanceField
 from brrp_cli.prior.objects import PriorObject, RestingPose
-from brrp_cli.prior.shard import APPEARANCE, ARRAYS, DISTANCES, StoredObject
+from brrp_cli.prior.shape import StoredShape
+from brrp_cli.prior.shard import APPEARANCE, ARRAYS, DISTANCES, MESH, StoredObject
 
 
 def pack(item: PriorObject, input_sha256: str) -> StoredObject:
     """As it is stored: clouds joined, features and their normals in half precision."""
     clouds = list(item.clouds.values())
-    arrays = {
+    arrays: dict[str, NDArray[Any]] = {
         "box": np.stack([item.center - _half(item), item.center + _half(item)]),
         "samples": item.samples,
         "labels": item.labels,
@@ -33,15 +34,16 @@ def pack(item: PriorObject, input_sha256: str) -> StoredObject:
         "pose_T": np.stack([pose.T_plane_object for pose in item.poses]),
         "pose_probability": np.array([pose.probability for pose in item.poses]),
     }
-    if item.appearance is not None:
-        arrays |= {f"{APPEARANCE}/{key}": value for key, value in vars(item.appearance).items()}
-    if item.distances is not None:
-        arrays |= {
-            f"{DISTANCES}/lower": item.distances.lower,
-            f"{DISTANCES}/spacing": np.array([item.distances.spacing]),
-            f"{DISTANCES}/values": item.distances.values,
-        }
-    typed = {key: arrays[key].astype(ARRAYS[key][0]) for key in ARRAYS if key in arrays}
+    arrays |= {f"{APPEARANCE}/{key}": value for key, value in vars(item.appearance).items()}
+    arrays |= {
+        f"{MESH}/vertices": item.shape.vertices,
+        f"{MESH}/faces": item.shape.faces,
+        f"{MESH}/colours": item.shape.colours,
+        f"{DISTANCES}/lower": item.shape.field.lower,
+        f"{DISTANCES}/spacing": np.array([item.shape.field.spacing]),
+        f"{DISTANCES}/values": item.shape.field.values,
+    }
+    typed = {key: arrays[key].astype(ARRAYS[key][0]) for key in ARRAYS}
     return StoredObject(item.name, input_sha256, typed, item.record)
 
 
@@ -74,24 +76,22 @@ def unpack(stored: StoredObject, description: str) -> PriorObject:
             for T, p in zip(arrays["pose_T"], arrays["pose_probability"], strict=True)
         ],
         record=stored.record,
-        appearance=unpack_appearance(stored.arrays),
-        distances=_unpack_distances(stored.arrays),
+        appearance=Appearance(
+            **{f.name: arrays[f"{APPEARANCE}/{f.name}"] for f in fields(Appearance)}
+        ),
+        shape=_unpack_shape(arrays),
     )
 
 
-def _unpack_distances(arrays: dict[str, NDArray[Any]]) -> DistanceField | None:
-    if f"{DISTANCES}/values" not in arrays:
-        return None
-    return DistanceField(
+def _unpack_shape(arrays: dict[str, NDArray[Any]]) -> StoredShape:
+    field = DistanceField(
         lower=arrays[f"{DISTANCES}/lower"],
         spacing=float(arrays[f"{DISTANCES}/spacing"][0]),
         values=arrays[f"{DISTANCES}/values"].astype(np.float32),
     )
-
-
-def unpack_appearance(arrays: dict[str, NDArray[Any]]) -> Appearance | None:
-    """The descriptors among a shard's arrays; None in a shard of an older brrp."""
-    found = {field.name: arrays.get(f"{APPEARANCE}/{field.name}") for field in fields(Appearance)}
-    if any(value is None for value in found.values()):
-        return None
-    return Appearance(**{key: value for key, value in found.items() if value is not None})
+    return StoredShape(
+        vertices=arrays[f"{MESH}/vertices"],
+        faces=arrays[f"{MESH}/faces"],
+        colours=arrays[f"{MESH}/colours"],
+        field=field,
+    )

@@ -70,6 +70,15 @@ class RepairConfig:
 
 
 @dataclass(frozen=True)
+class MeshConfig:
+    """The mesh that is kept: its faces are divided until no edge is longer than `edge`, a share of
+    the largest half-extent, as long as there are no more than `faces` of them."""
+
+    edge: float = 0.05
+    faces: int = 40_000
+
+
+@dataclass(frozen=True)
 class BuildParameters:
     """All of it. `units`: what one unit of the mesh files is."""
 
@@ -83,6 +92,7 @@ class BuildParameters:
     repair: RepairConfig = field(default_factory=RepairConfig)
     poses: PoseConfig = field(default_factory=PoseConfig)
     appearance: AppearanceConfig = field(default_factory=AppearanceConfig)
+    mesh: MeshConfig = field(default_factory=MeshConfig)
     distances: FieldConfig = field(default_factory=FieldConfig)
 
     def as_dict(self) -> dict[str, Any]:

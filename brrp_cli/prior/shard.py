@@ -17,11 +17,12 @@
         appearance/colour   (v, COLOUR_BINS) u1  square roots of histograms, 255 = 1; 0: no colours
         appearance/pairs    (v, PAIR_BINS)   u1  likewise
         appearance/sizes    (r, 3)  f4  metres: height, footprint in each resting pose
+        mesh/vertices       (w, 3)  f4  normalised: the closed mesh
+        mesh/faces          (t, 3)  i4  rows of vertices, outward
+        mesh/colours        (w, 3)  u1  RGB; grey where nothing is known of them
         distances/lower     (3,)    f8  normalised: the first node of a grid of signed distances
         distances/spacing   (1,)    f8
         distances/values    (a, b, c) f2  negative inside
-
-Schema 1 had neither appearance nor distances; its shards are still read.
 
 Every data set is chunked with fletcher32, shuffle and gzip. `content_sha256` covers the arrays and
 the record, so that an object can be taken over from a shard that no manifest vouches for.
@@ -53,7 +54,7 @@ from brrp_cli.prior.chunks import check_chunks
 if TYPE_CHECKING:
     import h5py
 
-SCHEMA = 2
+SCHEMA = 3
 KIND = "brrp-prior-shard"
 GZIP_LEVEL = 4
 # What one object may take in memory; one with a million samples takes 40 MB.
@@ -61,6 +62,7 @@ MAX_OBJECT_BYTES = 2**28
 
 APPEARANCE = "appearance"
 DISTANCES = "distances"
+MESH = "mesh"
 
 # data set -> (dtype, shape; a letter is a length, the same wherever it stands, "s+1" one more)
 ARRAYS: dict[str, tuple[str, tuple[int | str, ...]]] = {
@@ -79,6 +81,9 @@ ARRAYS: dict[str, tuple[str, tuple[int | str, ...]]] = {
     f"{APPEARANCE}/colour": ("|u1", ("v", COLOUR_BINS)),
     f"{APPEARANCE}/pairs": ("|u1", ("v", PAIR_BINS)),
     f"{APPEARANCE}/sizes": ("<f4", ("r", 3)),
+    f"{MESH}/vertices": ("<f4", ("w", 3)),
+    f"{MESH}/faces": ("<i4", ("t", 3)),
+    f"{MESH}/colours": ("|u1", ("w", 3)),
     f"{DISTANCES}/lower": ("<f8", (3,)),
     f"{DISTANCES}/spacing": ("<f8", (1,)),
     f"{DISTANCES}/values": ("<f2", ("a", "b", "c")),
@@ -108,8 +113,6 @@ def write_shard(path: Path, objects: list[StoredObject], parameters: dict[str, A
             group.attrs["record"] = json.dumps(stored.record)
             group.attrs["content_sha256"] = _content_sha256(stored.arrays, stored.record)
             for key, (dtype, _) in ARRAYS.items():
-                if key not in stored.arrays:
-                    continue
                 group.create_dataset(
                     key,
                     data=stored.arrays[key].astype(dtype),
@@ -140,7 +143,7 @@ _DAMAGE = (
 
 @contextmanager
 def open_shard(path: Path) -> Iterator[h5py.File]:
-    """Open to read; PriorError for what is no shard, is damaged, or is of a newer schema."""
+    """Open to read; PriorError for what is no shard, is damaged, or is of another schema."""
     import h5py
 
     if not path.is_file():
@@ -154,13 +157,13 @@ def open_shard(path: Path) -> Iterator[h5py.File]:
             if file.attrs.get("kind") != KIND:
                 raise PriorError("The file is no shard of a prior", where=path)
             schema = int(file.attrs["schema"])
-            if schema > SCHEMA:
+            if schema != SCHEMA:
                 raise PriorError(
-                    "The shard was written by a newer brrp",
+                    "The shard was written by another version of brrp",
                     where=path,
                     expected=f"schema {SCHEMA}",
                     found=f"schema {schema}",
-                    fix="pip install --upgrade brrp-cli",
+                    fix="build the prior anew, or read it with the version that built it",
                 )
             yield file
     except _DAMAGE as error:
@@ -201,19 +204,17 @@ def read_stored(file: h5py.File, name: str) -> StoredObject:
     reading = _Reading(where)
     group = _hard(file, f"objects/{name}", where)
     arrays: dict[str, NDArray[Any]] = {}
-    # Schema 1 has neither. Where one was taken out later, the checksum tells.
-    absent = tuple(f"{name}/" for name in (APPEARANCE, DISTANCES) if name not in group)
     for key, (dtype, shape) in ARRAYS.items():
-        if not key.startswith(absent):
-            arrays[key] = _read_array(group, key, dtype, shape, reading)
+        arrays[key] = _read_array(group, key, dtype, shape, reading)
     record = parse_json(group.attrs["record"])
     if _content_sha256(arrays, record) != group.attrs["content_sha256"]:
         raise damaged(where, "data that do not have the object's checksum")
     starts = arrays["cloud_starts"]
-    if DISTANCES in group and not (
-        arrays[f"{DISTANCES}/spacing"][0] > 0 and min(arrays[f"{DISTANCES}/values"].shape) > 1
-    ):
+    if not (arrays[f"{DISTANCES}/spacing"][0] > 0 and min(arrays[f"{DISTANCES}/values"].shape) > 1):
         raise damaged(where, "distances without a grid")
+    faces = arrays[f"{MESH}/faces"]
+    if not len(faces) or faces.min() < 0 or faces.max() >= reading.lengths["w"]:
+        raise damaged(where, "a mesh whose faces have corners that it lacks")
     if starts[0] != 0 or starts[-1] != reading.lengths["p"] or (np.diff(starts) < 0).any():
         raise damaged(where, "clouds that overlap")
     return StoredObject(name, str(group.attrs["input_sha256"]), arrays, record)
@@ -276,8 +277,6 @@ def _read_array(
 def _content_sha256(arrays: dict[str, NDArray[Any]], record: dict[str, Any]) -> str:
     digest = hashlib.sha256(json.dumps(record, sort_keys=True).encode())
     for key, (dtype, _) in ARRAYS.items():
-        if key not in arrays:
-            continue
         array = np.ascontiguousarray(arrays[key].astype(dtype))
         digest.update(f"{key}{array.shape}".encode())
         digest.update(array.tobytes())

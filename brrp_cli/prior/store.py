@@ -80,9 +80,9 @@ class Prior:
         return self.index.parameters
 
     @cached_property
-    def appearance(self) -> AppearanceIndex | None:
-        """What the objects look like, a row for each name (see looks.py); None in a prior of an
-        older brrp. Errors: PriorError."""
+    def appearance(self) -> AppearanceIndex:
+        """What the objects look like, a row for each name (see appearance_index.py). Errors:
+        PriorError."""
         return open_appearance_index(self.path, self.index, lambda: self.manifest)
 
     @property
@@ -149,7 +149,7 @@ def verify_prior(prior: Prior) -> list[str]:
         except BrrpError as error:
             problems.append(f"{shard.file}: {error.what}: {error.found or 'not there'}")
     sidecar = prior.manifest.appearance
-    if sidecar is not None and not is_whole(prior.path, sidecar):
+    if not is_whole(prior.path, sidecar):
         problems.append(f"{sidecar.file}: Missing or damaged; the next retrieval makes it again")
     listed = {shard.file for shard in prior.manifest.shards}
     for path in sorted((prior.path / "shards").glob("*.h5")):

@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brrp_cli.geometry import similarity
-from brrp_cli.methods.check_prior import no_distances
 from brrp_cli.prior.objects import PriorObject
 
 # Surface points that the coarse search uses. The stored points come in random order, so that every
@@ -28,25 +27,18 @@ class Model:
     normals: NDArray[np.float64]
 
     def signed_distance(self, points: NDArray[np.floating]) -> NDArray[np.float64]:
-        """Distance (n,), metres, of points (n, 3) to the surface, negative inside.
-
-        Errors: PriorError if the prior was made without distances.
-        """
-        if self.stored.distances is None:
-            raise no_distances(self.stored.name)
+        """Distance (n,), metres, of points (n, 3) to the surface, negative inside, from the coarse
+        field."""
         unit = self.stored.half_extent
-        return self.stored.distances.signed_distance(points / unit) * unit
+        return self.stored.shape.field.signed_distance(points / unit) * unit
 
     def distance_and_gradient(
         self, points: NDArray[np.float32]
     ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-        """`signed_distance` (n,) and its gradient (3, n), at points (3, n). Errors: PriorError,
-        likewise."""
-        if self.stored.distances is None:
-            raise no_distances(self.stored.name)
+        """`signed_distance` (n,) and its gradient (3, n), at points (3, n)."""
         unit = np.float32(self.stored.half_extent)
-        distance, slope = self.stored.distances.distance_and_gradient(points / unit)
-        return distance * unit, slope
+        distance, gradient = self.stored.shape.field.distance_and_gradient(points / unit)
+        return distance * unit, gradient
 
     @property
     def T_model_object(self) -> NDArray[np.float64]:

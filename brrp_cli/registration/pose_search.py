@@ -76,21 +76,11 @@ def search(
     ):
         T, reached = _best(T, model, verifier, config, count)
         if reached < least:
-            return _distinct(_judged(T[: config.fine], 1.0, model, verifier, config), config)
+            return _distinct(_judged(T[: config.fine], model, verifier, config), config)
         T = _refined(T, model, verifier, points, distance, steps)
-    found = _judged(T, 1.0, model, verifier, config)
-    parents = [each.T_cam_model for each in found[: config.rescaled]]
-    for scale in config.scales if found[0].alignment_score < config.settled else ():
-        resized = np.stack([_resize(parent, scale, verifier) for parent in parents])
-        resized = _refined(
-            resized,
-            model,
-            verifier,
-            config.middle_points,
-            config.scale_distance,
-            config.middle_steps,
-        )
-        found += _judged(resized, scale, model, verifier, config)
+    found = _judged(T, model, verifier, config)
+    if found[0].alignment_score < config.settled:
+        found += _of_other_sizes(found, model, verifier, config)
     return _distinct(sorted(found, key=lambda each: -each.alignment_score), config)
 
 
@@ -134,8 +124,17 @@ def _best(
 
 
 def _judged(
-    T_cam_model: Array, scale: float, model: Model, verifier: Verifier, config: SearchConfig
+    T_cam_model: Array,
+    model: Model,
+    verifier: Verifier,
+    config: SearchConfig,
+    scale: Array | float = 1.0,
+    cost: Array | float = 0.0,
 ) -> list[Hypothesis]:
+    """Placements (B, 4, 4), verified, best first; `scale` (B,) of the model's size, and what that
+    costs (B,)."""
+    if not len(T_cam_model):
+        return []
     score = verifier.score(
         T_cam_model,
         model,
@@ -143,8 +142,11 @@ def _judged(
         model_points=config.fine_points,
         seen_points=config.fine_points,
     )
-    score = score - config.scale_cost * np.log(scale) ** 2
-    found = [Hypothesis(model, T, scale, float(s)) for T, s in zip(T_cam_model, score, strict=True)]
+    scales = np.broadcast_to(scale, score.shape)
+    found = [
+        Hypothesis(model, T, float(size), float(s))
+        for T, size, s in zip(T_cam_model, scales, score - cost, strict=True)
+    ]
     return sorted(found, key=lambda each: -each.alignment_score)
 
 
@@ -156,6 +158,26 @@ def _refined(
     T_model_cam = np.asarray(np.linalg.inv(T_cam_model), dtype=np.float64)
     seen = verifier.points[:points]
     return np.asarray(np.linalg.inv(refine_to_sdf(T_model_cam, seen, model, distance, steps)))
+
+
+def _of_other_sizes(
+    found: list[Hypothesis], model: Model, verifier: Verifier, config: SearchConfig
+) -> list[Hypothesis]:
+    """The best placements again as those of something of that kind, but of another size, which is
+    refined with the pose. What comes out as large as the model is no other hypothesis."""
+    parents = [each.T_cam_model for each in found[: config.rescaled]]
+    T = np.stack([_resize(each, s, verifier) for each in parents for s in config.sizes])
+    T_model_cam = np.asarray(np.linalg.inv(T), dtype=np.float64)
+    seen = verifier.points[: config.middle_points]
+    for resize in (True, False):
+        T_model_cam = refine_to_sdf(
+            T_model_cam, seen, model, config.size_distance, config.middle_steps, resize=resize
+        )
+    T = np.asarray(np.linalg.inv(T_model_cam))
+    log_size = np.log(np.cbrt(np.linalg.det(T[:, :3, :3])))
+    other = (np.abs(log_size) > config.least_size_change) & (np.abs(log_size) < config.most_size)
+    cost = config.size_cost + config.size_spread_cost * log_size**2
+    return _judged(T[other], model, verifier, config, np.exp(log_size[other]), cost[other])
 
 
 def _resize(T_cam_model: Array, scale: float, verifier: Verifier) -> Array:

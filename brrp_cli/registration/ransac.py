@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -26,40 +25,28 @@ def match_features(
     source: FeatureCloud, target: FeatureCloud, config: RegistrationConfig, seed: int
 ) -> Match | None:
     """The rigid motion with most inlier pairs; None when no draw of matches holds together."""
-    return match_repeatedly(source, target, config, [seed])[0]
-
-
-def match_repeatedly(
-    source: FeatureCloud, target: FeatureCloud, config: RegistrationConfig, seeds: Sequence[int]
-) -> list[Match | None]:
-    """`match_features` with each seed; the features are matched once."""
     pipeline = import_open3d().pipelines.registration
     distance = config.correspondence_distance
     clouds = _cloud(source), _cloud(target)
     matched = pipeline.correspondences_from_features(_feature(source), _feature(target), False)
-    found: list[Match | None] = []
-    for seed in seeds:
-        with seeded_open3d(seed):
-            result = pipeline.registration_ransac_based_on_correspondence(
-                *clouds,
-                matched,
-                distance,
-                pipeline.TransformationEstimationPointToPoint(False),
-                config.draw,
-                [
-                    pipeline.CorrespondenceCheckerBasedOnEdgeLength(config.edge_length),
-                    pipeline.CorrespondenceCheckerBasedOnDistance(distance),
-                ],
-                pipeline.RANSACConvergenceCriteria(config.iterations, config.confidence),
-            )
-        inliers = len(result.correspondence_set)
-        # A draw that holds has at least its own pairs; without one, Open3D returns the identity.
-        if inliers <= config.draw:
-            found.append(None)
-        else:
-            T_target_source = np.asarray(result.transformation).copy()
-            found.append(Match(T_target_source, inliers, float(result.fitness)))
-    return found
+    with seeded_open3d(seed):
+        result = pipeline.registration_ransac_based_on_correspondence(
+            *clouds,
+            matched,
+            distance,
+            pipeline.TransformationEstimationPointToPoint(False),
+            config.draw,
+            [
+                pipeline.CorrespondenceCheckerBasedOnEdgeLength(config.edge_length),
+                pipeline.CorrespondenceCheckerBasedOnDistance(distance),
+            ],
+            pipeline.RANSACConvergenceCriteria(config.iterations, config.confidence),
+        )
+    inliers = len(result.correspondence_set)
+    # A draw that holds has at least its own pairs; without one, Open3D returns the identity.
+    if inliers <= config.draw:
+        return None
+    return Match(np.asarray(result.transformation).copy(), inliers, float(result.fitness))
 
 
 def match_pairs(source: FeatureCloud, target: FeatureCloud) -> NDArray[np.int64]:

@@ -17,13 +17,22 @@ Array = NDArray[np.float64]
 STILL = 2e-5
 # Of the mean diagonal: what is not seen of a ball's turn is not turned.
 DAMPING = 1e-6
+# A step changes the size by this share at most.
+MOST_RESIZED = 0.1
 
 
 def refine_to_sdf(
-    T_model_cam: Array, observed: Array, model: Model, distance: float, iterations: int
+    T_model_cam: Array,
+    observed: Array,
+    model: Model,
+    distance: float,
+    iterations: int,
+    *,
+    resize: bool = False,
 ) -> Array:
     """T_model_cam (B, 4, 4), similarities, each followed by the rigid motion that brings observed
-    points (n, 3), metres, camera frame, onto the model's surface.
+    points (n, 3), metres, camera frame, onto the model's surface; with `resize`, by a change of
+    size too.
 
     distance : points further from it than that, metres of the model, do not pull
     iterations : steps at most; a placement that stands still is left alone before
@@ -34,41 +43,49 @@ def refine_to_sdf(
         # The axis comes first: long contiguous rows are what NumPy is fast on.
         points = T[moving, :3, :3].swapaxes(0, 1) @ observed.T
         points += T[moving, :3, 3].T[..., None]
-        step = _step(points.astype(np.float32), model, distance)
-        T[moving] = _rigid(step) @ T[moving]
+        step = _step(points.astype(np.float32), model, distance, resize)
+        T[moving] = _motion(step) @ T[moving]
         moving = moving[np.abs(step).max(axis=1) > STILL]
         if not len(moving):
             break
     return T
 
 
-def _step(points: NDArray[np.float32], model: Model, distance: float) -> Array:
-    """Turn and shift (B, 6), about the model's middle, of points (3, B, n)."""
+def _step(points: NDArray[np.float32], model: Model, distance: float, resize: bool) -> Array:
+    """Turn, shift and change of log size (B, 7), about the model's middle, of points (3, B, n)."""
     _, batch, count = points.shape
     p = points.reshape(3, -1)
     value, slope = model.distance_and_gradient(p)
     pulls = np.abs(value) < distance
     slope *= pulls
-    rows = np.empty((6, batch * count), np.float32)
+    unknowns = 7 if resize else 6
+    rows = np.empty((unknowns, batch * count), np.float32)
     for i, (j, k) in enumerate(((1, 2), (2, 0), (0, 1))):
         rows[i] = p[j] * slope[k] - p[k] * slope[j]
-    rows[3:] = slope
-    rows = np.ascontiguousarray(rows.reshape(6, batch, count).swapaxes(0, 1))
+    rows[3:6] = slope
+    if resize:
+        rows[6] = (p * slope).sum(axis=0)
+    rows = np.ascontiguousarray(rows.reshape(unknowns, batch, count).swapaxes(0, 1))
     normal = (rows @ rows.mT).astype(np.float64)
     fall = rows @ value.reshape(batch, count, 1)
     trace = np.trace(normal, axis1=1, axis2=2)[:, None, None]
     # Nothing pulls where the trace is 0.
-    normal += (DAMPING * trace / 6 + (trace == 0)) * np.eye(6)
-    return np.asarray(-np.linalg.solve(normal, fall.astype(np.float64))[..., 0])
+    normal += (DAMPING * trace / unknowns + (trace == 0)) * np.eye(unknowns)
+    step = np.zeros((batch, 7))
+    step[:, :unknowns] = -np.linalg.solve(normal, fall.astype(np.float64))[..., 0]
+    step[:, 6] = np.clip(step[:, 6], -MOST_RESIZED, MOST_RESIZED)
+    return step
 
 
-def _rigid(step: Array) -> Array:
-    """(B, 4, 4) that turns by step[:, :3] (Rodrigues) and shifts by step[:, 3:]."""
+def _motion(step: Array) -> Array:
+    """(B, 4, 4) that turns by step[:, :3] (Rodrigues), shifts by step[:, 3:6] and resizes by
+    exp(step[:, 6])."""
     angle = np.linalg.norm(step[:, :3], axis=1)[:, None, None]
     x, y, z = (step[:, :3] / np.maximum(angle[:, 0], 1e-12)).T
     zero = np.zeros_like(x)
     K = np.stack([zero, -z, y, z, zero, -x, -y, x, zero], axis=1).reshape(-1, 3, 3)
     T = np.tile(np.eye(4), (len(step), 1, 1))
     T[:, :3, :3] += np.sin(angle) * K + (1 - np.cos(angle)) * (K @ K)
-    T[:, :3, 3] = step[:, 3:]
+    T[:, :3, :3] *= np.exp(step[:, 6])[:, None, None]
+    T[:, :3, 3] = step[:, 3:6]
     return T

@@ -16,7 +16,6 @@ from brrp_cli.errors import RetrievalError
 from brrp_cli.frames.frame import BACKGROUND, Frame
 from brrp_cli.observation.ray_samples import box_center
 from brrp_cli.observation.support_plane import Plane, fit_plane
-from brrp_cli.prior.appearance_index import AppearanceIndex
 from brrp_cli.prior.store import Prior
 from brrp_cli.retrieval.illuminants import lights, local_lights, log_prior
 from brrp_cli.retrieval.observed_appearance import see_object
@@ -25,21 +24,8 @@ from brrp_cli.retrieval.shortlist import Shortlist
 from brrp_cli.retrieval.similarity import evidence, lit_histograms
 
 
-def need_appearance(prior: Prior) -> AppearanceIndex:
-    """The prior's descriptors. Errors: RetrievalError if it has none."""
-    looks = prior.appearance
-    if looks is None:
-        raise RetrievalError(
-            "The prior does not know what its objects look like",
-            where=prior.path,
-            found="a prior that an older brrp built",
-            fix="run brrp build-prior MESHES --overwrite, or pass --retriever fitness",
-        )
-    return looks
-
-
 class AppearanceRetriever:
-    """P(c|R) from colour, shape and size. Errors: RetrievalError if the prior has no descriptors.
+    """P(c|R) from colour, shape and size.
 
     The objects of a frame are judged together, since one light falls on all of them: the first
     question about a frame costs as much as all of its objects, the others cost nothing.
@@ -48,7 +34,7 @@ class AppearanceRetriever:
     name = "appearance"
 
     def __init__(self, prior: Prior, config: Config, seed: int) -> None:
-        self._looks = need_appearance(prior)
+        self._looks = prior.appearance
         self._config = config
         own = config.retrieval
         self._shortlist = Shortlist(self._looks.first, own)

@@ -14,18 +14,15 @@ if TYPE_CHECKING:
     from brrp_cli.retrieval.base import Retriever
 
 # In place of a name, a file with probabilities may stand.
-RETRIEVERS = ("auto", "clip", "appearance", "both", "fitness", "uniform")
+RETRIEVERS = ("auto", "clip", "appearance", "both", "uniform")
 USE_CLIP = ("clip", "both")
-USE_APPEARANCE = ("appearance", "both")
 
 
-def resolve_name(name: str, clip_dir: Path | None = None, prior: Prior | None = None) -> str:
+def resolve_name(name: str, clip_dir: Path | None = None) -> str:
     """What `auto` means here; other names mean themselves."""
     if name != "auto":
         return name
-    if clip_folder(clip_dir):
-        return "clip"
-    return "appearance" if prior is None or prior.index.appearance else "fitness"
+    return "clip" if clip_folder(clip_dir) else "appearance"
 
 
 def choose_retriever(
@@ -33,12 +30,12 @@ def choose_retriever(
 ) -> Retriever:
     """The retriever of that name, or the one that reads the file of that name.
 
-    `auto` is CLIP where there is one, else appearance where the prior knows it, else fitness.
+    `auto` is CLIP where there is one, else appearance.
 
     clip_dir : folder with CLIP as ONNX; without it, the one that BRRP_CLIP_DIR names, else the one
     that `brrp fetch clip` filled. Errors: RetrievalError.
     """
-    name = resolve_name(name, clip_dir, prior)
+    name = resolve_name(name, clip_dir)
     if name == "both":
         from brrp_cli.retrieval.combined import BothRetriever
 
@@ -54,10 +51,6 @@ def _one(name: str, prior: Prior, config: Config, seed: int, clip_dir: Path | No
         from brrp_cli.retrieval.appearance import AppearanceRetriever
 
         return AppearanceRetriever(prior, config, seed)
-    if name == "fitness":
-        from brrp_cli.retrieval.fitness import FitnessRetriever
-
-        return FitnessRetriever(prior, config, seed)
     if name == "uniform":
         from brrp_cli.retrieval.given import UniformRetriever
 

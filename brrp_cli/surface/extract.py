@@ -10,7 +10,10 @@ from numpy.typing import NDArray
 from brrp_cli.config import SurfaceConfig
 from brrp_cli.errors import BrrpError
 from brrp_cli.finite import check_finite
+from brrp_cli.inference.hypothesis_posterior import HypothesisPosterior
 from brrp_cli.reconstruction import Axes, OccupancyPosterior, Surface
+from brrp_cli.surface.connect import one_piece
+from brrp_cli.surface.stored_mesh import moved_mesh
 
 # How far, at least, the occupancy of what is inside lies above the level: 10 micrometres.
 _CLEAR = 1e-3
@@ -26,15 +29,25 @@ def grid_axes(bounds: NDArray[np.floating], spacing: float) -> Axes:
 def extract_surface(
     posterior: OccupancyPosterior, observed: NDArray[np.floating], config: SurfaceConfig
 ) -> Surface | None:
-    """Marching cubes at `config.level` on the mean occupancy, around what was observed.
+    """The surface where the mean occupancy is `config.level`.
+
+    The stored mesh, moved there, where a placed shape explains the object; marching cubes
+    elsewhere, and where the frame contradicts the shape by more than its mesh can be moved.
 
     observed : (n, 3) points of the object, metres, camera frame. Parts of the level set that no
     observed point is near are dropped: where neither rays nor prior samples reach, the map keeps
     the noise that the particles started from. Returns None when nothing is left. Errors: BrrpError
     if the posterior is not finite, or wider than any object.
     """
-    _check_size(posterior.bounds, config.spacing)
-    axes = grid_axes(posterior.bounds, config.spacing)
+    if isinstance(posterior, HypothesisPosterior) and posterior.dominant is not None:
+        moved = moved_mesh(posterior, posterior.dominant, config)
+        check_finite("The surface", vertices=moved.vertices, uncertainty=moved.deviation)
+        if moved.off <= config.most_off:
+            return Surface(
+                moved.vertices, moved.faces, moved.deviation, posterior.surface_unit, moved.colours
+            )
+    spacing = grid_spacing(posterior.bounds, config)
+    axes = grid_axes(posterior.bounds, spacing)
     volume = posterior.probability_volume(axes)
     check_finite("The posterior", occupancy=volume)
     found = level_set(volume, axes, observed, config.level, config)
@@ -52,6 +65,15 @@ class LevelSet(NamedTuple):
     faces: NDArray[np.int64]
 
 
+def grid_spacing(bounds: NDArray[np.floating], config: SurfaceConfig) -> float:
+    """Metres between nodes: about `config.nodes` nodes in the box (2, 3), within the limits."""
+    size = np.asarray(bounds[1] - bounds[0], dtype=np.float64)
+    spacing = float((np.prod(size) / config.nodes) ** (1 / 3))
+    spacing = float(np.clip(spacing, config.finest, config.spacing))
+    _check_size(size, spacing)
+    return spacing
+
+
 def level_set(
     volume: NDArray[np.floating],
     axes: Axes,
@@ -60,12 +82,14 @@ def level_set(
     config: SurfaceConfig,
 ) -> LevelSet | None:
     """Marching cubes at `level` on occupancy (nx, ny, nz) at the nodes of `axes`, metres, camera
-    frame; parts that no point of `observed` (n, 3) is near are dropped. None if nothing is left.
+    frame: one piece (connect.py), which the points `observed` (n, 3) lie on. None if nothing is
+    left.
     """
     from skimage.measure import marching_cubes
 
     origin = np.array([axis[0] for axis in axes])
-    kept = _near_observed(volume >= level, (observed - origin) / config.spacing, config)
+    spacing = float(axes[0][1] - axes[0][0])
+    kept = one_piece(volume, level, (observed - origin) / spacing, spacing, config)
     if not kept.any():
         return None
     # What was dropped must not leave a surface; a border of zeros closes what touches the bounds.
@@ -74,14 +98,13 @@ def level_set(
     volume = np.where(kept, np.maximum(volume, level + _CLEAR), volume)
     volume = np.pad(volume, 1)
     vertices, faces, _, _ = marching_cubes(volume, level, gradient_direction="ascent")
-    vertices = (vertices.astype(np.float64) - 1) * config.spacing + origin
+    vertices = (vertices.astype(np.float64) - 1) * spacing + origin
     return LevelSet(vertices, faces.astype(np.int64))
 
 
-def _check_size(bounds: NDArray[np.floating], spacing: float) -> None:
+def _check_size(size: NDArray[np.float64], spacing: float) -> None:
     """BrrpError where a grid would hold more nodes than memory: one stray pixel of a mask on a
     far wall makes an object metres wide."""
-    size = np.asarray(bounds[1] - bounds[0], dtype=np.float64)
     if not np.prod(size / spacing + 1) <= MAX_NODES:
         raise BrrpError(
             "The object is too wide for a surface",
@@ -89,21 +112,3 @@ def _check_size(bounds: NDArray[np.floating], spacing: float) -> None:
             found=" x ".join(f"{side:.2f}" for side in size) + " m",
             fix="take pixels of what lies behind it out of its mask",
         )
-
-
-def _near_observed(
-    occupied: NDArray[np.bool_], observed: NDArray[np.floating], config: SurfaceConfig
-) -> NDArray[np.bool_]:
-    """The connected parts of `occupied` that come near an observed point (n, 3), in cells."""
-    from scipy.ndimage import distance_transform_edt
-    from skimage.measure import label
-
-    cells = np.rint(observed).astype(np.int64)
-    cells = cells[((cells >= 0) & (cells < occupied.shape)).all(axis=1)]
-    if not len(cells):
-        return np.zeros_like(occupied)
-    far = np.ones(occupied.shape, dtype=bool)
-    far[tuple(cells.T)] = False
-    near = distance_transform_edt(far) * config.spacing <= config.keep_distance
-    parts = label(occupied, connectivity=3)
-    return np.asarray(np.isin(parts, np.unique(parts[near & occupied])) & occupied)

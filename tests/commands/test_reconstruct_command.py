@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 import trimesh
 from click.testing import CliRunner
-from older_prior import older_prior
 from PIL import Image
 
 from brrp_cli import load_frame, make_frame, open_posterior, open_prior, reconstruct
@@ -268,14 +267,6 @@ def test_where_no_object_gets_a_surface_the_record_is_written_all_the_same(
     ]
     assert Image.open(tmp_path / "out" / "preview.png").size[0] == 3 * 480
     assert open_posterior(tmp_path / "out" / "posterior.h5") == {}
-
-
-def test_an_older_prior_is_refused_by_one_message_that_says_what_to_do(frame_file, prior, tmp_path):
-    older = older_prior(prior, tmp_path / "older")
-    code, output = run(frame_file, "--prior", older, "-o", tmp_path / "out")
-    assert code == 1 and output.count("no distances") == 1
-    assert "build-prior MESHES --overwrite" in output and "--preset paper" in output
-    assert not (tmp_path / "out").exists()
 
 
 def test_a_table_of_probabilities_is_used_as_it_is(frame_file, prior, tmp_path):

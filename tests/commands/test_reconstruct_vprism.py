@@ -171,7 +171,7 @@ def test_the_posterior_can_be_asked_again(out, again):
         ("--prior", "prior/"),
         ("--k", 3),
         ("--preset", "paper"),
-        ("--retriever", "fitness"),
+        ("--retriever", "uniform"),
         ("--clip-dir", "clip/"),
         ("--device", "cuda"),
     ],

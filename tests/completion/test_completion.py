@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from brrp_cli.inference.prior_mean import PriorMeanGrid, completed_grid, empty_space, grid_over
 from table_scene import TABLE, box, in_camera, photograph, placed
 
 from brrp_cli.completion.network import Network, fitted, from_bytes
@@ -14,7 +15,6 @@ from brrp_cli.completion.visible_part import visible_part
 from brrp_cli.config import CompletionConfig, MeanConfig
 from brrp_cli.frames.projection import at_pixels, depth_behind
 from brrp_cli.geometry import transform_points
-from brrp_cli.inference.prior_mean import PriorMeanGrid, completed_grid, empty_space, grid_over
 from brrp_cli.observation.support_plane import Plane
 from brrp_cli.shapes import solids
 

@@ -12,7 +12,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 from click.testing import CliRunner
-from older_prior import older_prior
 from PIL import Image
 from tiny_scenes import write_meshes, write_scene
 
@@ -38,11 +37,6 @@ def place(tmp_path_factory):
         patch.setenv("XDG_CACHE_HOME", str(folder / "cache"))
         patch.delenv("BRRP_CLIP_DIR", raising=False)
         yield folder
-
-
-@pytest.fixture(scope="module")
-def older(place):
-    return older_prior(place / "prior", place / "older")
 
 
 def run(place, *options):
@@ -225,25 +219,6 @@ def test_mistakes_are_told_before_the_work(place, tmp_path, options, text):
     assert result.exit_code in (1, 2)
     assert text in result.output
     assert not (tmp_path / "out" / "report.md").exists()
-
-
-@pytest.mark.parametrize(
-    ("options", "text"),
-    [
-        (("--method", "retrieval", "--retriever", "appearance"), "what its objects look like"),
-        (("--method", "retrieval", "--retriever", "both"), "what its objects look like"),
-        (("--preset", "paper", "--retriever", "fitness,appearance"), "what its objects look like"),
-        (("--preset", "default", "--retriever", "truth"), "no distances"),
-    ],
-)
-def test_what_an_older_prior_lacks_is_told_once_before_the_work(
-    place, older, tmp_path, options, text
-):
-    method = () if "--method" in options else ("--method", "brrp")
-    result = run(place, *method, *options, "--prior", older, "-o", tmp_path / "out")
-    assert result.exit_code == 1
-    assert result.output.count(text) == 1 and "--overwrite" in result.output
-    assert not (tmp_path / "out").exists()
 
 
 def started(place, output):

@@ -1,7 +1,14 @@
 import numpy as np
 import torch
 
-from brrp_cli.inference.hinge import HingeGrid, axis_factors, cubic_grid, features, grid_logits
+from brrp_cli.inference.hinge import (
+    HingeGrid,
+    axis_factors,
+    cubic_grid,
+    factors,
+    features,
+    grid_logits,
+)
 
 GRID = cubic_grid(per_axis=5, half_width=0.1, floor=1e-7)
 
@@ -37,7 +44,7 @@ def test_a_kernel_is_one_on_its_own_hinge_point():
     np.testing.assert_allclose(torch.diagonal(axis_factors(axis, GRID, 0)), np.ones(5))
 
 
-def test_lattice_logits_equal_the_features_point_by_point_with_axes_in_order():
+def test_grid_logits_equal_the_features_point_by_point_with_axes_in_order():
     generator = torch.Generator().manual_seed(0)
     weights = torch.randn(3, GRID.dimension, generator=generator, dtype=torch.float64)
     # Axes of three lengths: a swapped axis cannot go unseen.
@@ -58,3 +65,19 @@ def test_a_box_of_hinge_points_keeps_its_axes_apart():
     found = features(hinge, grid)[0, 1:]
     assert int(found.argmax()) == (i * 3 + j) * 4 + k
     np.testing.assert_allclose(float(found.max()), 1)
+
+
+def test_a_kernel_under_the_floor_is_cut_before_it_is_multiplied():
+    """And no feature changes: those that reach the floor have no factor under it."""
+    grid = HingeGrid((0.0, 0.0, 0.0), (14, 13, 12), 0.02, 1e-7)
+    points = torch.rand(200, 3, generator=torch.Generator().manual_seed(0)) * 0.3
+    every = factors(points, grid)
+    least = 1e-7
+    assert every.first[every.first > 0].min() >= least
+    assert every.rest[every.rest > 0].min() >= least**2
+    assert (every.first == 0).any() and (every.rest == 0).any()
+    steps = [0.02 * torch.arange(n) for n in grid.counts]
+    x, y, z = (torch.exp(-(((points[:, i, None] - steps[i]) / 0.02) ** 2)) for i in range(3))
+    product = (x[:, :, None, None] * y[:, None, :, None] * z[:, None, None, :]).flatten(1)
+    expected = torch.where(product < grid.floor, 0.0, product)
+    assert torch.equal(features(points, grid)[:, 1:], expected)

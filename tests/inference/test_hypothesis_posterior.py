@@ -7,12 +7,12 @@ from dataclasses import replace
 import h5py
 import numpy as np
 import pytest
+from brrp_cli.inference.prior_mean import PriorMeanGrid
 
 from brrp_cli.errors import BrrpError
 from brrp_cli.inference.hinge import HingeGrid
 from brrp_cli.inference.hypothesis_posterior import LARGEST, HypothesisPosterior
 from brrp_cli.inference.posterior import HilbertPosterior
-from brrp_cli.inference.prior_mean import PriorMeanGrid
 from brrp_cli.methods.posterior_file import open_posterior
 from brrp_cli.results.posterior_file import save_posteriors
 

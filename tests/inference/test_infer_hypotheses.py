@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from brrp_cli.inference.prior_mean import PriorMeanGrid, grid_over, shape_logits
 
 from brrp_cli.config import FittedMapConfig, MeanConfig
 from brrp_cli.inference.infer import LabelledPoints
@@ -15,7 +16,6 @@ from brrp_cli.inference.infer_hypotheses import (
     infer_correction,
     systematic_resampling,
 )
-from brrp_cli.inference.prior_mean import PriorMeanGrid, grid_over, shape_logits
 
 MEAN = replace(MeanConfig(), nodes=20_000)
 # Fewer hinge points than the preset has: the same code in a fraction of a second.
@@ -184,6 +184,18 @@ def test_each_particle_has_the_mean_of_its_hypothesis():
     assert list(posterior.which) == [0] * 6 + [1] * 2
     assert posterior.probability(CENTER[None])[0] == pytest.approx(0.75, abs=0.02)
     assert posterior.uncertainty(CENTER[None])[0] == pytest.approx(0.75 * 0.25, abs=0.02)
+
+
+def test_a_hypothesis_is_corrected_as_if_the_other_were_not_there():
+    """Another mean for the second half of the particles leaves the first half as it was."""
+    points = around(500)
+    observed = LabelledPoints(points, ball(points) < 0)
+    beside_empty, beside_ball = (infer(observed, ball, other) for other in (empty, ball))
+    assert list(beside_empty.which) == [0] * 4 + [1] * 4
+    first, same = (p.correction.weights[:4] for p in (beside_empty, beside_ball))
+    assert first.tobytes() == same.tobytes()
+    second, other = (p.correction.weights[4:] for p in (beside_empty, beside_ball))
+    assert second.tobytes() != other.tobytes()
 
 
 def test_the_same_seed_gives_the_same_bytes_and_another_does_not():

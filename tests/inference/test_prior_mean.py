@@ -7,16 +7,16 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-
-from brrp_cli.config import MeanConfig
-from brrp_cli.frames.frame import Frame
-from brrp_cli.geometry import backproject
 from brrp_cli.inference.prior_mean import (
     PriorMeanGrid,
     empty_space,
     grid_over,
     shape_logits,
 )
+
+from brrp_cli.config import MeanConfig
+from brrp_cli.frames.frame import Frame
+from brrp_cli.geometry import backproject
 from brrp_cli.observation.support_plane import Plane
 
 CONFIG = MeanConfig()

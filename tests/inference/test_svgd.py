@@ -1,7 +1,8 @@
 import numpy as np
+import pytest
 import torch
 
-from brrp_cli.inference.svgd import median_bandwidth, run_svgd, stein_direction
+from brrp_cli.inference.svgd import groups_of, median_bandwidth, run_svgd, stein_direction
 
 
 def gaussian_score(mean, covariance):
@@ -77,3 +78,50 @@ def test_the_start_is_not_changed():
     start = torch.ones(2, 3)
     run_svgd(start, lambda particles, step: -particles, steps=3, learning_rate=0.1)
     assert (start == 1).all()
+
+
+def test_two_hypotheses_recover_their_own_posteriors_known_in_closed_form():
+    """Bayesian linear regression of y = m_c + w x + noise with two means m_c, 3 : 1 likely."""
+    generator = torch.Generator().manual_seed(0)
+    inputs = torch.randn(12, 1, generator=generator, dtype=torch.float64)
+    noise = 0.5 * torch.randn(12, generator=generator, dtype=torch.float64)
+    targets = torch.stack([2 * inputs[:, 0], -inputs[:, 0]]) + noise
+    which = torch.tensor([0, 1, 0, 0] * 15)
+    variance = 1 / (1 + inputs.square().sum() / 0.25)
+    means = variance * (targets @ inputs)[:, 0] / 0.25
+
+    def score(particles, step):
+        return (targets[which] - particles @ inputs.T) @ inputs / 0.25 - particles
+
+    start = 0.3 * torch.randn(len(which), 1, generator=generator, dtype=torch.float64)
+    particles = run_svgd(start, score, steps=800, learning_rate=0.02, groups=groups_of(which))
+    found = [particles[which == group, 0] for group in (0, 1)]
+    for each, mean in zip(found, means, strict=True):
+        assert each.mean() == pytest.approx(float(mean), abs=0.1 * float(variance.sqrt()))
+        assert each.var() == pytest.approx(float(variance), rel=0.2)
+    mixture = 0.75 * means[0] + 0.25 * means[1]
+    assert particles.mean() == pytest.approx(float(mixture), abs=0.1 * float(variance.sqrt()))
+
+
+def test_each_group_is_svgd_by_itself():
+    generator = torch.Generator().manual_seed(1)
+    particles, scores = (torch.randn(9, 5, generator=generator) for _ in range(2))
+    which = torch.tensor([3, 0, 3, 1, 0, 3, 0, 0, 3])
+    found = stein_direction(particles, scores, groups_of(which))
+    for group in (0, 3):
+        rows = which == group
+        expected = stein_direction(particles[rows], scores[rows])
+        torch.testing.assert_close(found[rows], expected)
+    torch.testing.assert_close(found[3], scores[3], rtol=0, atol=0)
+
+
+def test_particles_that_are_all_alone_follow_their_scores():
+    generator = torch.Generator().manual_seed(2)
+    particles, scores = (torch.randn(4, 5, generator=generator) for _ in range(2))
+    torch.testing.assert_close(
+        stein_direction(particles, scores, groups_of(torch.arange(4))), scores
+    )
+
+
+def test_one_group_is_no_groups():
+    assert groups_of(torch.full((8,), 5)) is None

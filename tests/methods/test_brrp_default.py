@@ -7,16 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import trimesh
-from older_prior import older_prior
 from table_scene import box, in_camera, photograph, placed
 
 from brrp_cli import open_posterior, open_prior, reconstruct, write_results
 from brrp_cli.config import preset
-from brrp_cli.errors import PriorError
 from brrp_cli.geometry import transform_points
 from brrp_cli.prior.build.build import build_prior
 from brrp_cli.prior.parameters import BuildParameters
-from brrp_cli.prior.store import verify_prior
 from brrp_cli.raycast import inside
 from brrp_cli.reconstruction import NO_SURFACE, OK
 from brrp_cli.retrieval.given import TruthRetriever
@@ -91,7 +88,7 @@ def test_the_best_placement_is_the_true_one(result, truth, folder):
     local = transform_points(np.linalg.inv(true), surface)
     radius, height = np.hypot(*local[:, :2].T), local[:, 2]
     assert radius.max() < 0.045 and height.min() > -0.005 and height.max() < 0.125
-    assert item.retrieved[0].scale == 1.0
+    assert item.retrieved[0].size_factor == 1.0
 
 
 def test_surface_uncertainty_is_in_metres_and_larger_where_nobody_looked(result, truth):
@@ -141,34 +138,6 @@ def test_without_a_table_in_sight_there_is_a_result_too(folder, truth):
     found = reconstruct(frame, open_prior(folder))
     assert found.plane is None
     assert iou(found.objects[0].surface, truth[CAN]) > 0.7
-
-
-def test_a_prior_without_distances_is_refused_before_the_work(folder, truth, tmp_path):
-    older = open_prior(older_prior(folder, tmp_path / "older"))
-    assert verify_prior(older) == []
-    assert older.load("can").distances is None
-    with pytest.raises(PriorError, match="no distances") as caught:
-        reconstruct(photograph(truth), older)
-    assert "--overwrite" in str(caught.value) and "--preset paper" in str(caught.value)
-
-
-def test_a_prior_without_distances_serves_the_paper(folder, truth, tmp_path):
-    older = open_prior(older_prior(folder, tmp_path / "older"))
-    paper = preset("paper")
-    quick = replace(
-        paper,
-        k=1,
-        registration=replace(paper.registration, iterations=2000),
-        inference=replace(paper.inference, epochs=1, particles=2),
-    )
-    found = reconstruct(
-        photograph({CAN: truth[CAN]}),
-        older,
-        config=quick,
-        retriever=TruthRetriever(older.names, {CAN: "can"}),
-    )
-    assert found.objects[0].status in (OK, NO_SURFACE)
-    assert found.objects[0].retrieved[0].name == "can"
 
 
 def test_the_number_of_threads_changes_no_byte(folder, truth, result):

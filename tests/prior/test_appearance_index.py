@@ -14,14 +14,12 @@ def first_file(folder: Path) -> Path:
 
 
 def all_rows(prior: Prior) -> np.ndarray:
-    assert prior.appearance is not None
     return prior.appearance.rows(np.arange(len(prior.names)))
 
 
 def test_a_first_look_is_the_mean_over_views(pristine: Path) -> None:
     prior = open_prior(pristine)
     rows = all_rows(prior)
-    assert prior.appearance is not None
     first = prior.appearance.first
     np.testing.assert_array_equal(first.sizes, rows["sizes"])
     mean = rows["pairs"].mean(axis=1)
@@ -33,7 +31,6 @@ def test_a_first_look_is_the_mean_over_views(pristine: Path) -> None:
 
 def test_rows_come_in_the_order_asked_for(pristine: Path) -> None:
     prior = open_prior(pristine)
-    assert prior.appearance is not None
     found = prior.appearance.rows(np.array([2, 0]))
     assert found.tobytes() == all_rows(prior)[[2, 0]].tobytes()
     assert len(prior.appearance.rows(np.array([], dtype=np.int64))) == 0
@@ -53,7 +50,6 @@ def test_a_first_look_that_cannot_be_used_is_made_again(prior_folder: Path, harm
     elif harm == "other":
         np.savez(path, **arrays | {"appearance": np.array("0" * 64)})
     prior = open_prior(prior_folder)
-    assert prior.appearance is not None
     expected = first_look(all_rows(prior))
     for name, value in vars(prior.appearance.first).items():
         np.testing.assert_array_equal(value, getattr(expected, name))

@@ -28,7 +28,6 @@ def contents(folder: Path) -> dict[str, str]:
     prior = open_prior(folder)
     found = {"parameters": json.dumps(prior.parameters, sort_keys=True)}
     looks = prior.appearance
-    assert looks is not None
     rows = looks.rows(np.arange(len(prior.names)))
     for name, row in zip(prior.names, rows, strict=True):
         item = prior.load(name)
@@ -39,7 +38,6 @@ def contents(folder: Path) -> dict[str, str]:
             parts += [cloud.points, cloud.normals, cloud.fpfh]
         for pose in item.poses:
             parts += [pose.T_plane_object, np.array(pose.probability)]
-        assert item.distances is not None
         parts += [item.distances.lower, item.distances.values]
         for part in parts:
             digest.update(np.ascontiguousarray(part).tobytes())

@@ -9,7 +9,7 @@ import h5py
 import numpy as np
 import pytest
 import trimesh
-from test_shard import example
+from stored_example import example
 
 from brrp_cli.errors import PriorError
 from brrp_cli.prior.distance_field import DistanceField, distance_field
@@ -130,12 +130,6 @@ def test_a_shard_gives_the_field_back_as_it_was(shard, plate):
     np.testing.assert_array_equal(found.signed_distance(points), plate.signed_distance(points))
 
 
-def test_an_object_of_an_older_brrp_has_no_field(tmp_path):
-    write_shard(tmp_path / "old.h5", [pack(replace(example(), distances=None), "aa")], {})
-    with open_shard(tmp_path / "old.h5") as file:
-        assert unpack(read_stored(file, "cup"), "a cup").distances is None
-
-
 def truncated(group):
     values = group["values"][1:]
     del group["values"]
@@ -182,7 +176,7 @@ def gone(group):
         (unbounded, "NaN or infinite"),
         (wider, "checksum"),
         (dropped, "no data set distances/lower"),
-        (gone, "checksum"),
+        (gone, "no data set distances/lower"),
     ],
 )
 def test_damaged_distances_are_refused(shard, damage, told):

@@ -22,7 +22,7 @@ from file_faults import in_a_process
 from brrp_cli.errors import PriorError
 from brrp_cli.files import sha256_file
 from brrp_cli.prior.index import INDEX_FILE
-from brrp_cli.prior.manifest import FILE, read_manifest, write_manifest
+from brrp_cli.prior.manifest import FILE, read_manifest, with_own_sum, write_manifest
 from brrp_cli.prior.shard import ARRAYS
 from brrp_cli.prior.store import open_prior, verify_prior
 
@@ -275,6 +275,7 @@ MANIFESTS: dict[str, Callable[[dict], object]] = {
     "a schema of text": lambda t: t.update(schema="x"),
     "an endless schema": lambda t: t.update(schema=float("inf")),
     "a newer schema": lambda t: t.update(schema=99),
+    "no appearance": lambda t: t.pop("appearance"),
     "views without end": lambda t: t["parameters"]["appearance"].update(views=10**12),
     "no views": lambda t: t["parameters"].update(appearance=None),
     "other views than stored": lambda t: t["parameters"]["appearance"].update(views=7),
@@ -284,16 +285,22 @@ MANIFESTS: dict[str, Callable[[dict], object]] = {
 @pytest.mark.parametrize("name", MANIFESTS)
 def test_a_forged_manifest_is_one_message(prior_folder: Path, name: str) -> None:
     table = json.loads((prior_folder / FILE).read_text())
-    del table["content_sha256"]
     MANIFESTS[name](table)
-    (prior_folder / FILE).write_text(json.dumps(table))
+    (prior_folder / FILE).write_bytes(with_own_sum(table))
     (prior_folder / INDEX_FILE).unlink()
     with pytest.raises(PriorError) as caught:
         prior = open_prior(prior_folder)
         assert "views" in name
-        assert prior.appearance is not None
         prior.appearance.rows(np.arange(len(prior.names)))
     assert len(str(caught.value)) < 2_000
+
+
+def test_a_manifest_without_its_own_sum_is_refused(prior_folder: Path) -> None:
+    table = json.loads((prior_folder / FILE).read_text())
+    del table["content_sha256"]
+    (prior_folder / FILE).write_text(json.dumps(table, indent=1))
+    with pytest.raises(PriorError, match="no content_sha256"):
+        open_prior(prior_folder)
 
 
 def test_manifests_that_are_no_json_or_endless_are_one_message(prior_folder: Path) -> None:

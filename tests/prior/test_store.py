@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 from brrp_cli.errors import PriorError
+from brrp_cli.prior.manifest import with_own_sum
 from brrp_cli.prior.store import open_prior, verify_prior
 
 
@@ -90,9 +91,8 @@ def test_missing_swapped_and_extra_shards_are_found(prior_folder: Path) -> None:
 def rewrite(folder: Path, change: dict[str, object]) -> None:
     path = folder / "manifest.json"
     table = json.loads(path.read_text())
-    # Whoever forges a manifest leaves out its sum, or mends it.
-    del table["content_sha256"]
-    path.write_text(json.dumps({**table, **change}))
+    # Whoever forges a manifest mends its sum.
+    path.write_bytes(with_own_sum({**table, **change}))
 
 
 @pytest.mark.parametrize(

@@ -1,14 +1,16 @@
 """Registration recovers a known pose and scale of a mesh from a partial view."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import trimesh
+from stored_example import example
 
 from brrp_cli.config import FeatureConfig, RegistrationConfig
 from brrp_cli.dependencies import import_open3d
 from brrp_cli.descriptors.fpfh import fpfh_cloud
 from brrp_cli.geometry import transform_points
-from brrp_cli.prior.objects import PriorObject
 from brrp_cli.registration.scale_scan import observed_cloud, register
 
 # Steps of a fifth: neighbouring scales of the full scan are told apart only by whole views.
@@ -38,20 +40,7 @@ def stored(mesh):
         scale: fpfh_cloud(points * FEATURES.base_scale * scale, FEATURES, normals=normals)
         for scale in FEATURES.scales
     }
-    empty = np.zeros((0, 3), dtype=np.float32)
-    return PriorObject(
-        name="drill",
-        description="a drill",
-        center=np.zeros(3),
-        half_extent=1.0,
-        samples=empty,
-        labels=np.zeros(0, dtype=bool),
-        surface=empty,
-        surface_normals=empty,
-        clouds=clouds,
-        poses=[],
-        record={},
-    )
+    return replace(example("drill"), clouds=clouds)
 
 
 def seen_from_the_origin(mesh):

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
+from stored_example import example
 
 from brrp_cli.config import RegistrationConfig
 from brrp_cli.geometry import similarity, transform_points
 from brrp_cli.prior.distance_field import DistanceField
-from brrp_cli.prior.objects import PriorObject
 from brrp_cli.registration.batched_ransac import ransac_motions
 from brrp_cli.registration.model import Model
 from brrp_cli.registration.sdf_refinement import refine_to_sdf
@@ -35,11 +37,7 @@ def field():
 @pytest.fixture(scope="module")
 def model(field):
     nothing = np.zeros((0, 3))
-    stored = PriorObject(
-        "box", "a box", np.zeros(3), 1.0, nothing, nothing, nothing, nothing, {}, [], {},
-        distances=field,
-    )  # fmt: skip
-    return Model(stored, nothing, nothing)
+    return Model(replace(example("box"), half_extent=1.0, distances=field), nothing, nothing)
 
 
 @pytest.fixture(scope="module")

@@ -50,22 +50,19 @@ def fetched(xenova: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Pa
     return Path(shutil.copytree(xenova, clip_files.clip_cache()))
 
 
-def older(prior: Prior) -> Prior:
-    """The same prior as a brrp without appearance built it."""
-    return Prior(prior.path, replace(prior.index, appearance=None))
-
-
-def test_auto_without_clip_is_appearance_where_the_prior_knows_it(prior: Prior) -> None:
-    assert resolve_name("auto", None, prior) == "appearance"
-    assert resolve_name("auto", None, older(prior)) == "fitness"
+def test_auto_without_clip_is_appearance(prior: Prior) -> None:
+    assert resolve_name("auto") == "appearance"
     assert choose_retriever("auto", prior, CONFIG, 0).name == "appearance"
-    assert choose_retriever("auto", older(prior), CONFIG, 0).name == "fitness"
 
 
 @pytest.mark.usefixtures("fetched")
 def test_auto_is_clip_where_it_was_fetched(prior: Prior) -> None:
-    for opened in (prior, older(prior)):
-        assert choose_retriever("auto", opened, CONFIG, 0).name == "clip"
+    assert choose_retriever("auto", prior, CONFIG, 0).name == "clip"
+
+
+def test_there_is_no_retriever_by_fitness(prior: Prior) -> None:
+    with pytest.raises(RetrievalError, match="No such retriever"):
+        choose_retriever("fitness", prior, CONFIG, 0)
 
 
 def test_auto_is_clip_where_a_folder_is_named(

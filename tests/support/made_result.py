@@ -7,13 +7,13 @@ from pathlib import Path
 
 import numpy as np
 import trimesh
+from brrp_cli.inference.prior_mean import PriorMeanGrid
 from table_scene import TABLE, in_camera, photograph, placed
 
 from brrp_cli.config import SurfaceConfig, preset
 from brrp_cli.inference.hinge import HingeGrid
 from brrp_cli.inference.hypothesis_posterior import HypothesisPosterior
 from brrp_cli.inference.posterior import HilbertPosterior
-from brrp_cli.inference.prior_mean import PriorMeanGrid
 from brrp_cli.raycast import raycasting_scene
 from brrp_cli.reconstruction import (
     OK,

@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 from eight_objects import NETWORK, write_scenes
+from training.examples import Examples, Recipe, scene_examples
 
 from brrp_cli.ground_truth.scenes import Scene
-from brrp_cli.training.examples import Examples, Recipe, scene_examples
 
 STEPS, RATE = 350, 1e-2
 
@@ -46,8 +46,9 @@ def place(tmp_path_factory) -> Place:
 @pytest.fixture(scope="session")
 def learnt(place) -> Place:
     """The same after a training that has learnt the eight by heart: all of them in every step."""
+    from training.pointsdf import Training, TrainingConfig
+
     from brrp_cli.methods.pointsdf.weights import save_weights
-    from brrp_cli.training.pointsdf import Training, TrainingConfig
 
     config = TrainingConfig(batch=8, queries=512, noise=0.0, learning_rate=RATE)
     about = {"name": "eight"}

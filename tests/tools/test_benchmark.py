@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import torch
 from benchmark import main
+from brrp_cli.prior.build.build.build import build_prior
 from click.testing import CliRunner
 from plain.density import dense_features, gradient, hinge_points, log_posterior, mean_bce
 from plain.svgd import stein_direction as plain_direction
@@ -18,7 +19,6 @@ from brrp_cli.frames.npz import save_frame
 from brrp_cli.inference.density import Lambdas, Samples, log_density, logistic_score
 from brrp_cli.inference.hinge import HingeGrid, cubic_grid, factors, features
 from brrp_cli.inference.svgd import stein_direction
-from brrp_cli.prior.build.build import build_prior
 from brrp_cli.prior.parameters import BuildParameters
 
 PER_AXIS, HALF_WIDTH, FLOOR = 5, 0.15, 1e-7
@@ -142,6 +142,7 @@ def test_the_benchmark_keeps_what_it_measured(frame, tmp_path):
     assert "registration" in result.output and "GFLOP/s" in result.output
     (line,) = history.read_text().splitlines()
     record = json.loads(line)
+    assert record["frames"][0]["denormals"] == {} and "denormal numbers: none" in result.output
     assert record["machine"]["flops"] > 0 and record["peak_megabytes"] > 0
     (found,) = record["frames"]
     assert found["objects"] == 1 and set(found["limits"]) <= set(found["stages"])

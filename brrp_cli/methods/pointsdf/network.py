@@ -52,20 +52,6 @@ class NetworkConfig:
     hidden: int = 512
     dropout: float = 0.2
 
-    def narrowed(self, width: float) -> NetworkConfig:
-        """The same with `width` times as many features in every layer but the two codes."""
-
-        def fewer(count: int) -> int:
-            return max(8, round(count * width))
-
-        return NetworkConfig(
-            **{
-                **vars(self),
-                "features": tuple(tuple(fewer(n) for n in layer) for layer in self.features),
-                "hidden": fewer(self.hidden),
-            }
-        )
-
 
 def read_config(record: dict[str, Any]) -> NetworkConfig:
     """What `asdict` made of a NetworkConfig and JSON gave back. Errors: KeyError, TypeError."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -84,13 +84,13 @@ def build_prior(
         run = _Run(out, table, sources, reusable_objects(out, before, table))
         run.hash_inputs()
         run.make(parameters or BuildParameters(), workers or cores(), time_limit, progress)
-        manifest = run.with_sidecar(run.manifest(phrases), before)
-        if not manifest.objects:
+        if not run.done:
             raise MeshError(
                 "None of the meshes became an object",
                 where=meshes,
-                found="\n".join(f"{f.source}: {f.reason}" for f in manifest.failed),
+                found="\n".join(f"{f.source}: {f.reason}" for f in run.failures()),
             )
+        manifest = run.manifest(phrases, before)
         if before is None or before.as_bytes() != manifest.as_bytes():
             write_manifest(out, manifest)
         # Now, so that not the first to open the prior pays for it.
@@ -216,39 +216,43 @@ class _Run:
         with open_shard(self.out / self.stock[name, sha256].shard) as shard:
             return read_stored(shard, name)
 
-    def manifest(self, phrases: dict[str, str]) -> Manifest:
+    def failures(self) -> list[Failure]:
+        """The meshes that did not become objects."""
+        return [
+            Failure(name, self.sources[name].relative, self.failed[name])
+            for name in sorted(self.failed)
+        ]
+
+    def manifest(self, phrases: dict[str, str], before: Manifest | None) -> Manifest:
         """All that stands now."""
         files = sorted({finished.shard for finished in self.done.values()})
         paths = {file: self.out / file for file in files}
+        objects = [
+            ObjectEntry(
+                name=name,
+                description=phrases[name],
+                source=self.sources[name].relative,
+                input_sha256=self.hashes[name],
+                shard=self.done[name].shard,
+                record=self.done[name].record,
+            )
+            for name in sorted(self.done)
+        ]
         return Manifest(
             parameters=self.parameters,
-            objects=[
-                ObjectEntry(
-                    name=name,
-                    description=phrases[name],
-                    source=self.sources[name].relative,
-                    input_sha256=self.hashes[name],
-                    shard=self.done[name].shard,
-                    record=self.done[name].record,
-                )
-                for name in sorted(self.done)
-            ],
+            objects=objects,
             shards=[ShardEntry(f, sha256_file(p), p.stat().st_size) for f, p in paths.items()],
-            failed=[
-                Failure(name, self.sources[name].relative, self.failed[name])
-                for name in sorted(self.failed)
-            ],
+            failed=self.failures(),
+            appearance=self._sidecar(objects, before),
         )
 
-    def with_sidecar(self, manifest: Manifest, before: Manifest | None) -> Manifest:
-        """With the file of all objects' appearance, which is written unless it stands already."""
-        if not manifest.objects:
-            return manifest
+    def _sidecar(self, objects: list[ObjectEntry], before: Manifest | None) -> ShardEntry:
+        """The file of all objects' appearance, which is written unless it stands already."""
         entry = before.appearance if before is not None else None
-        file = sidecar_file(manifest.objects, self.parameters)
+        file = sidecar_file(objects, self.parameters)
         if entry is None or entry.file != file or not is_whole(self.out, entry):
-            entry = write_sidecar(self.out, manifest.objects, self.parameters)
-        return replace(manifest, appearance=entry)
+            entry = write_sidecar(self.out, objects, self.parameters)
+        return entry
 
 
 def make_stored(source: MeshSource, sha256: str, parameters: BuildParameters) -> StoredObject:
@@ -283,10 +287,9 @@ def _previous(out: Path) -> Manifest | None:
 
 def _sweep(out: Path, manifest: Manifest) -> None:
     """Delete files that nothing refers to, and what killed runs left half written."""
+    appearance = out / manifest.appearance.file
     listed = {out / shard.file for shard in manifest.shards}
-    if manifest.appearance is not None:
-        path = out / manifest.appearance.file
-        listed |= {path, path.with_suffix(".npz")}
+    listed |= {appearance, appearance.with_suffix(".npz")}
     for path in [
         *(out / "shards").glob("shard-*.h5"),
         *(out / "shards").glob(".shard-*.partial.h5"),

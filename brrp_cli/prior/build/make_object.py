@@ -8,6 +8,7 @@ from importlib.metadata import version
 import numpy as np
 
 from brrp_cli.errors import BrrpError, MeshError
+from brrp_cli.geometry import similarity
 from brrp_cli.prior.build.appearance import describe_appearance
 from brrp_cli.prior.build.clouds import feature_clouds, spread
 from brrp_cli.prior.build.coloured_mesh import PaintedMesh, load_painted, unpainted
@@ -16,7 +17,7 @@ from brrp_cli.prior.build.load_mesh import load_mesh
 from brrp_cli.prior.build.repair import repair
 from brrp_cli.prior.build.resting_poses import resting_poses
 from brrp_cli.prior.build.samples import draw_samples, surface_points
-from brrp_cli.prior.distance_field import distance_field
+from brrp_cli.prior.build.stored_shape import stored_shape
 from brrp_cli.prior.objects import PriorObject
 from brrp_cli.prior.parameters import BuildParameters
 from brrp_cli.seeds import child_rng
@@ -94,8 +95,10 @@ def _from_mesh(  # type: ignore[no-untyped-def]
         surface, normals = spread(dense, dense_normals, parameters.surface_points)
     with timed(seconds, "features"):
         clouds = feature_clouds(dense, dense_normals, parameters.features)
-    with timed(seconds, "distances"):
-        distances = distance_field(mesh, parameters.distances)
+    with timed(seconds, "mesh"):
+        # Colours are in the frame of the file, metres.
+        T_mesh_painted = similarity(1 / half_extent, translation=-(center + offset) / half_extent)
+        shape = stored_shape(mesh, painted, T_mesh_painted, parameters.distances, parameters.mesh)
     return PriorObject(
         name=name,
         description="",
@@ -119,7 +122,7 @@ def _from_mesh(  # type: ignore[no-untyped-def]
             "made_with": {library: library_version(library) for library in LIBRARIES},
         },
         appearance=appearance,
-        distances=distances,
+        shape=shape,
     )
 
 

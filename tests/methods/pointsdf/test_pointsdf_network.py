@@ -1,5 +1,3 @@
-from dataclasses import replace
-
 import pytest
 import torch
 from eight_objects import NETWORK
@@ -50,9 +48,6 @@ def test_the_published_layers_are_the_default():
     assert {layer.neighbours for layer in network.encoder.layers} == {32}
     assert network.encoder.code[0].in_features == 36 * 512
     assert network.encode(clouds(2, 256)).shape == (2, 256)
-    half = config.narrowed(0.5)
-    assert half.features[-1] == (128, 128, 256) and half.hidden == 256
-    assert replace(half, features=config.features, hidden=config.hidden) == config
 
 
 def test_neighbours_are_the_nearest():

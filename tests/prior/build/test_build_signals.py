@@ -18,7 +18,8 @@ from small_prior import prior_bytes
 
 import brrp_cli
 from brrp_cli.errors import PriorError
-from brrp_cli.prior.build.build import build, build_prior
+from brrp_cli.prior.build import build
+from brrp_cli.prior.build.build import build_prior
 from brrp_cli.prior.build.shard_plan import plan_shards
 from brrp_cli.prior.shard import object_names, open_shard
 from brrp_cli.prior.store import open_prior, verify_prior
@@ -234,7 +235,6 @@ def test_readers_see_a_whole_prior_at_every_moment(
                 try:
                     for name in prior.names:
                         prior.load(name)
-                    assert prior.appearance is not None
                     reads += 1
                 except PriorError as error:
                     # It was replaced between opening and reading, and says so.

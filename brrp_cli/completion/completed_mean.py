@@ -1,0 +1,94 @@
+"""The prior mean function of an object that none of the stored ones explains, and the space that it
+cannot be in.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import binary_dilation, maximum_filter, minimum_filter
+
+from brrp_cli.completion.network import fitted
+from brrp_cli.completion.point_features import point_features
+from brrp_cli.completion.visible_part import VisiblePart
+from brrp_cli.config import MeanConfig
+from brrp_cli.frames.frame import BACKGROUND, Frame
+from brrp_cli.frames.projection import at_pixels, depth_behind
+from brrp_cli.observation.support_plane import Plane
+
+Array = NDArray[np.float64]
+Floats = NDArray[np.float32]
+
+
+def completed_grid(
+    nodes: Array, empty: NDArray[np.bool_], part: VisiblePart, config: MeanConfig
+) -> NDArray[np.float16]:
+    """Logits (nx, ny, nz) at nodes (nx, ny, nz, 3), metres, camera frame, of an object that is none
+    of the stored ones; the least where it is empty.
+
+    The network is asked at every second node along each axis, and at the nodes between where those
+    around are neither all out of doubt (`beyond_doubt`) inside nor all outside.
+    """
+    near = binary_dilation(~empty, np.ones((3, 3, 3), bool))
+    # One node more at the end where the last one would have none after it.
+    odd = np.pad(near, [(0, 1 - n % 2) for n in near.shape])[::2, ::2, ::2]
+    steps = [np.arange(n) * 2 for n in odd.shape]
+    at = nodes[0, 0, 0] + (nodes[1, 1, 1] - nodes[0, 0, 0]) * np.stack(
+        np.meshgrid(*steps, indexing="ij"), axis=-1
+    )
+    asked = np.full(odd.shape, -config.limit, np.float32)
+    asked[odd] = _network(at[odd], part)
+    doubtful = (maximum_filter(asked, 3) > -config.beyond_doubt) & (
+        minimum_filter(asked, 3) < config.beyond_doubt
+    )
+    for axis, count in enumerate(empty.shape):
+        asked = _doubled(asked, axis, count)
+        doubtful = doubtful.repeat(2, axis=axis).take(np.arange(count), axis=axis)
+    doubtful &= ~empty
+    asked[doubtful] = _network(nodes[doubtful], part)
+    logits = np.full(empty.shape, -config.limit, np.float16)
+    logits[~empty] = _with_crust(asked[~empty], nodes[~empty], part, config)
+    return logits
+
+
+def _network(points: Array, part: VisiblePart) -> Floats:
+    return fitted().logits(point_features(points, part)) if len(points) else np.empty(0, np.float32)
+
+
+def _doubled(values: Floats, axis: int, count: int) -> Floats:
+    """The first `count` of values along an axis with the mean of each two between them."""
+    first = np.moveaxis(values, axis, 0)
+    found = np.empty((2 * len(first) - 1, *first.shape[1:]), values.dtype)
+    found[::2] = first
+    found[1::2] = (first[:-1] + first[1:]) / 2
+    return np.moveaxis(found[:count], 0, axis)
+
+
+def _with_crust(logits: Floats, points: Array, part: VisiblePart, config: MeanConfig) -> Array:
+    """The network's logits (n,) at points (n, 3), limited. What was seen has some thickness,
+    however thin the walls are that the network thinks of."""
+    limited = np.clip(logits, -config.limit, config.limit)
+    behind = -depth_behind(points, part.frame)
+    own = at_pixels(points, part.frame.segmap, part.frame) == part.object_id
+    shell = (
+        own & (np.nan_to_num(behind, nan=np.inf) < config.shell) & (behind > -config.shell_before)
+    )
+    return np.where(shell, np.maximum(limited, config.shell_logit), limited)
+
+
+def empty_space(
+    points: Array, frame: Frame, object_id: int, plane: Plane | None, config: MeanConfig
+) -> NDArray[np.bool_]:
+    """Which of `points` (n, 3), metres, camera frame, cannot be in the object.
+
+    Space in front of the measured depth; space below the plane; and, since the object would hide
+    it, space close to a surface that is no object's.
+    """
+    behind = depth_behind(points, frame)
+    empty = np.nan_to_num(behind, nan=-np.inf) > config.carve_depth
+    if plane is not None:
+        empty |= plane.signed_distance(points) < -config.carve_plane
+    own = binary_dilation(frame.segmap == object_id, iterations=config.carve_pixels)
+    background = np.where((frame.segmap == BACKGROUND) & ~own, 1, 0)
+    close = np.nan_to_num(behind, nan=-np.inf) > -config.carve_behind
+    return empty | (close & (at_pixels(points, background, frame) == 1))

@@ -1,0 +1,121 @@
+"""The prior mean function of a stored object that was placed in the scene.
+
+m(x) = -d(x) / width, limited to +-limit, with d the signed distance to the placed surface,
+evaluated in the model's own frame: exact within the band where the logit is not at its limit.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brrp_cli.geometry import transform_points
+from brrp_cli.hdf5 import write_compressed
+from brrp_cli.prior.distance_field import DistanceField
+from brrp_cli.prior.shape import StoredShape
+from brrp_cli.reconstruction import Axes
+
+if TYPE_CHECKING:
+    import h5py
+
+    from brrp_cli.hdf5 import SharedParts
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class PlacedShape:
+    """A stored shape where a hypothesis puts it.
+
+    T_cam_shape : (4, 4) similarity from the shape's coordinates; width : metres, scale of the
+    logistic function across the surface; limit : of the logit
+    """
+
+    kind: ClassVar[str] = "shape"
+
+    name: str
+    shape: StoredShape
+    T_cam_shape: Array
+    width: float
+    limit: float
+
+    @property
+    def unit(self) -> float:
+        """Metres of one unit of the shape's coordinates."""
+        return float(np.cbrt(np.linalg.det(self.T_cam_shape[:3, :3])))
+
+    @property
+    def vertices(self) -> Array:
+        """(n, 3) metres, camera frame."""
+        vertices = transform_points(self.T_cam_shape, self.shape.vertices.astype(np.float64))
+        return np.asarray(vertices, dtype=np.float64)
+
+    @property
+    def normals(self) -> Array:
+        """(n, 3) unit, outward, camera frame."""
+        return np.asarray(self.shape.normals @ (self.T_cam_shape[:3, :3] / self.unit).T)
+
+    @property
+    def bounds(self) -> Array:
+        """(2, 3) metres, camera frame."""
+        vertices = self.vertices
+        return np.stack([vertices.min(axis=0), vertices.max(axis=0)])
+
+    def signed_distance(self, points: NDArray[np.floating], band: float) -> Array:
+        """Distance (n,), metres, of points (n, 3), camera frame; exact where it is under `band`."""
+        local = transform_points(np.linalg.inv(self.T_cam_shape), np.asarray(points, np.float64))
+        return self.shape.signed_distance(local, band / self.unit) * self.unit
+
+    def logits(self, points: NDArray[np.floating]) -> NDArray[np.float32]:
+        """m (n,) at points (n, 3), metres, camera frame."""
+        distance = self.signed_distance(points, self.limit * self.width)
+        limited = np.clip(-distance / self.width, -self.limit, self.limit)
+        return np.asarray(limited, dtype=np.float32)
+
+    def volume(self, axes: Axes) -> NDArray[np.float32]:
+        """m (nx, ny, nz) on a grid of camera-frame coordinates, metres."""
+        nodes = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
+        return self.logits(nodes.reshape(-1, 3)).reshape(nodes.shape[:3])
+
+    def write(self, group: h5py.Group, shared: SharedParts) -> None:
+        """Attributes name, T_cam_shape (4, 4), width, limit, and shape, the name of the stored
+        shape among what the file's objects share."""
+        group.attrs.update({"name": self.name, "T_cam_shape": self.T_cam_shape})
+        group.attrs.update({"width": self.width, "limit": self.limit})
+        group.attrs["shape"] = shared.write("shape", self.shape, _write_shape)
+
+    @classmethod
+    def read(cls, group: h5py.Group, shared: SharedParts) -> PlacedShape:
+        """What `write` wrote. Errors: KeyError, ValueError."""
+        return PlacedShape(
+            str(group.attrs["name"]),
+            shared.read(str(group.attrs["shape"]), _read_shape),
+            np.asarray(group.attrs["T_cam_shape"], dtype=np.float64),
+            float(group.attrs["width"]),
+            float(group.attrs["limit"]),
+        )
+
+
+def _write_shape(group: h5py.Group, shape: StoredShape) -> None:
+    """Attributes lower (3) and spacing of the field; vertices (n, 3) float32, faces (m, 3) int32,
+    colours (n, 3) uint8, field (nx, ny, nz) float16."""
+    group.attrs.update({"lower": shape.field.lower, "spacing": shape.field.spacing})
+    for key in ("vertices", "faces", "colours"):
+        write_compressed(group, key, getattr(shape, key))
+    write_compressed(group, "field", shape.field.values.astype(np.float16))
+
+
+def _read_shape(group: h5py.Group) -> StoredShape:
+    vertices = np.asarray(group["vertices"], dtype=np.float32)
+    faces = np.asarray(group["faces"], dtype=np.int32)
+    if not len(faces) or faces.min() < 0 or faces.max() >= len(vertices):
+        raise ValueError("a mesh whose faces have corners that it lacks")
+    field = DistanceField(
+        np.asarray(group.attrs["lower"], dtype=np.float64),
+        float(group.attrs["spacing"]),
+        np.asarray(group["field"], dtype=np.float32),
+    )
+    return StoredShape(vertices, faces, np.asarray(group["colours"], dtype=np.uint8), field)

@@ -1,0 +1,52 @@
+"""Observed samples with the probability that each is occupied, given how far the sensor errs."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import ndtr
+
+from brrp_cli.config import SensorConfig
+from brrp_cli.frames.frame import BACKGROUND, Frame
+from brrp_cli.frames.projection import at_pixels, depth_behind
+from brrp_cli.observation.ray_samples import ObjectObservation
+
+Array = NDArray[np.float64]
+
+
+def depth_deviation(depth: NDArray[np.floating], config: SensorConfig) -> Array:
+    """Standard deviation (n,), metres, of depth measured at depths (n,), metres."""
+    return np.asarray(config.noise + config.noise_growth * np.asarray(depth, np.float64) ** 2)
+
+
+def soft_samples(
+    observation: ObjectObservation, frame: Frame, distance: float, config: SensorConfig
+) -> tuple[Array, Array, Array]:
+    """Points (n, 3), metres, camera frame, the probability (n,) that each is in the object, and the
+    point of the seen surface (n, 3) that it comes from, NaN for free space.
+
+    The seen surface is asked `distance` metres in front of and behind of where it was measured: the
+    measurement itself is as much outside as inside. A free sample that lies a few standard
+    deviations in front of the measured depth is free for certain; at the measured depth, it may be
+    either. Another object's surface is moved behind, where it is that object's.
+    """
+    points = np.asarray(observation.samples, dtype=np.float64)
+    seen, free = points[observation.labels], points[~observation.labels]
+    sure = ndtr(distance / depth_deviation(seen[:, 2], config))
+    gap = depth_behind(free, frame)
+    measured = np.abs(np.nan_to_num(gap, nan=np.inf)) < config.sure * depth_deviation(
+        free[:, 2], config
+    )
+    mask = at_pixels(free, frame.segmap, frame)
+    others = measured & (mask != BACKGROUND) & (mask != observation.object_id)
+    free = np.concatenate([_along(free[others], distance), free[~measured]])
+    return (
+        np.concatenate([_along(seen, distance), _along(seen, -distance), free]),
+        np.concatenate([sure, 1 - sure, np.zeros(len(free))]),
+        np.concatenate([seen, seen, np.full_like(free, np.nan)]),
+    )
+
+
+def _along(points: Array, distance: float) -> Array:
+    """Points (n, 3) moved away from the camera by `distance` metres."""
+    return points * (1 + distance / np.linalg.norm(points, axis=1, keepdims=True))

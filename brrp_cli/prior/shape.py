@@ -1,0 +1,68 @@
+"""The closed mesh of a stored object, with its colours, and signed distances that are exact where
+it matters: within millimetres of the surface."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brrp_cli.dependencies import import_open3d
+from brrp_cli.prior.distance_field import DistanceField
+
+# Rays that vote on which side of the surface a point lies: one that grazes an edge is outvoted.
+RAYS = 3
+
+
+@dataclass(frozen=True)
+class StoredShape:
+    """A closed, outward mesh in the unit and frame of the field that goes with it.
+
+    vertices : (n, 3) float32; faces : (m, 3) int32
+    colours : (n, 3) uint8, RGB; grey where nothing is known of them
+    field : signed distances on a coarse grid, which serve far from the surface
+    """
+
+    vertices: NDArray[np.float32]
+    faces: NDArray[np.int32]
+    colours: NDArray[np.uint8]
+    field: DistanceField
+
+    @cached_property
+    def scene(self) -> Any:
+        """Open3D's RaycastingScene of the mesh, on one thread."""
+        o3d = import_open3d()
+        scene = o3d.t.geometry.RaycastingScene(nthreads=1)
+        scene.add_triangles(
+            o3d.core.Tensor(np.ascontiguousarray(self.vertices, dtype=np.float32)),
+            o3d.core.Tensor(np.ascontiguousarray(self.faces, dtype=np.uint32)),
+        )
+        return scene
+
+    @cached_property
+    def normals(self) -> NDArray[np.float64]:
+        """(n, 3) unit, outward, at the vertices: the mean of the faces around, by angle."""
+        import trimesh
+
+        mesh = trimesh.Trimesh(self.vertices, self.faces, process=False)
+        return np.asarray(mesh.vertex_normals, dtype=np.float64)
+
+    def signed_distance(self, points: NDArray[np.floating], band: float) -> NDArray[np.float64]:
+        """Distance (n,) of points (n, 3), negative inside.
+
+        Exact where it is less than `band`; further away, the field's, which is right to about its
+        spacing.
+        """
+        points = np.asarray(points)
+        distance = self.field.signed_distance(points)
+        near = np.flatnonzero(np.abs(distance) < band + self.field.spacing * np.sqrt(3))
+        if len(near):
+            o3d = import_open3d()
+            query = o3d.core.Tensor(np.ascontiguousarray(points[near], dtype=np.float32))
+            exact = self.scene.compute_distance(query, nthreads=1).numpy()
+            inside = self.scene.compute_occupancy(query, nthreads=1, nsamples=RAYS).numpy() > 0.5
+            distance[near] = np.where(inside, -exact, exact)
+        return distance

@@ -1,0 +1,1 @@
+"""Shapes drawn at random: household shapes of random dimensions, and solids of no kind."""
