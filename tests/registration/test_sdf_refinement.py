@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
-from stored_example import example
+from stored_example import example, with_field
 
 from brrp_cli.config import RegistrationConfig
 from brrp_cli.geometry import similarity, transform_points
@@ -37,7 +35,7 @@ def field():
 @pytest.fixture(scope="module")
 def model(field):
     nothing = np.zeros((0, 3))
-    return Model(replace(example("box"), half_extent=1.0, distances=field), nothing, nothing)
+    return Model(with_field(example("box"), field, half_extent=1.0), nothing, nothing)
 
 
 @pytest.fixture(scope="module")
