@@ -16,7 +16,9 @@ from brrp_cli.errors import BrrpError
 from brrp_cli.reconstruction import METRES
 from brrp_cli.surface.extract import extract_surface
 
-SPACING = SurfaceConfig().spacing
+SPACING = 0.005
+# As fine as the grid below is.
+CONFIG = SurfaceConfig(spacing=SPACING, finest=SPACING)
 CELLS = 7
 SIDE = SPACING * (CELLS - 1)
 
@@ -55,7 +57,7 @@ OBSERVED = np.array([[0.1, -0.2, 0.7]]) + SIDE / 2
     )
 )
 def test_any_occupancy_gives_a_closed_outward_mesh_or_none(values: np.ndarray) -> None:
-    surface = extract_surface(Grid(values), OBSERVED, SurfaceConfig())
+    surface = extract_surface(Grid(values), OBSERVED, CONFIG)
     if surface is None:
         return
     # As it is written and read: single precision.
@@ -72,12 +74,12 @@ def test_any_occupancy_gives_a_closed_outward_mesh_or_none(values: np.ndarray) -
 def test_an_occupancy_that_is_no_number_never_becomes_a_mesh(bad: float) -> None:
     values = np.zeros((CELLS,) * 3, np.float32)
     values[2:5, 2:5, 2:5] = 1
-    assert extract_surface(Grid(values), OBSERVED, SurfaceConfig()) is not None
+    assert extract_surface(Grid(values), OBSERVED, CONFIG) is not None
     with pytest.raises(BrrpError, match="surface gave numbers that are NaN"):
-        extract_surface(Grid(values, doubt=bad), OBSERVED, SurfaceConfig())
+        extract_surface(Grid(values, doubt=bad), OBSERVED, CONFIG)
     values[0, 0, 0] = bad
     with pytest.raises(BrrpError, match="posterior gave numbers that are NaN"):
-        extract_surface(Grid(values), OBSERVED, SurfaceConfig())
+        extract_surface(Grid(values), OBSERVED, CONFIG)
 
 
 def test_an_object_wider_than_memory_is_refused_before_it_is_asked() -> None:
@@ -88,5 +90,5 @@ def test_an_object_wider_than_memory_is_refused_before_it_is_asked() -> None:
             raise AssertionError("it was asked")
 
     with pytest.raises(BrrpError, match="too wide for a surface") as caught:
-        extract_surface(Wide(np.zeros(1)), OBSERVED, SurfaceConfig())
+        extract_surface(Wide(np.zeros(1)), OBSERVED, CONFIG)
     assert "40.00 x 28.00 x 90.00 m" in str(caught.value)
