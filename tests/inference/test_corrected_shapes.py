@@ -107,7 +107,7 @@ def test_a_step_that_is_not_there_is_taken_away_and_nothing_else():
     below = rng.uniform([0.01, -0.045, 0.005], [0.055, 0.045, 0.055], (200, 3))
     for inside in (kept, below):
         assert (posterior.probability(transform_points(T, inside)) > 0.5).all()
-    # The surface stays where it is away from the step by more than a hinge point reaches.
+    # Away from the step the surface stays where it is.
     vertices = transform_points(np.linalg.inv(T), posterior.means[0].vertices)
     offset, moved = offsets(posterior)
     away = vertices[:, 0] < -0.03

@@ -84,7 +84,7 @@ def test_its_posterior_reads_and_writes_itself(registered, out):
     found = open_posterior(out / "posterior.h5")
     assert set(found) == {4, 9} and found[4].width is found[9].width
     mesh = trimesh.load_mesh(out / "object_9.ply", process=False)
-    np.testing.assert_allclose(found[9].probability(mesh.vertices), 0.4, atol=0.02)
+    np.testing.assert_allclose(found[9].probability(mesh.vertices), 0.5, atol=0.02)
     with h5py.File(out / "posterior.h5") as file:
         assert list(file["shared"]) == ["width"], "what all objects have is written once"
     assert open_result(out).posteriors[4].radius == found[4].radius

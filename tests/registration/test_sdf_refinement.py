@@ -87,6 +87,57 @@ def test_a_placement_that_nothing_pulls_stays(model, surface):
     np.testing.assert_allclose(found[1], np.eye(4), atol=2e-3)
 
 
+def size_of(T_model_cam):
+    """Of what was seen, in the model's size."""
+    return np.cbrt(np.linalg.det(T_model_cam[:3, :3])) ** -1
+
+
+@pytest.mark.parametrize("size", [0.85, 1.0, 1.2])
+@pytest.mark.parametrize("noise", [0.0, 0.001])
+def test_a_box_of_another_size_gets_its_size(model, surface, size, noise):
+    T_cam_true = moved(7, 40, 0.3)
+    T_cam_true[:3, :3] *= size
+    error = np.random.default_rng(2).normal(0, noise, (300, 3))
+    observed = transform_points(T_cam_true, surface) + error
+    # Rigid starts: nothing says how large it is.
+    rigid = moved(7, 40, 0.3)
+    starts = np.stack([moved(seed, 5, 0.004) @ np.linalg.inv(rigid) for seed in range(4)])
+    found = refine_to_sdf(starts, observed, model, 0.03, 25, resize=True)
+    for T in found:
+        assert size_of(T) == pytest.approx(size, rel=0.01 + 2 * noise / HALF.min())
+        placed_at = transform_points(T, transform_points(T_cam_true, surface))
+        assert np.abs(box_distance(placed_at)).mean() < 2e-4 + noise / 2
+
+
+@pytest.mark.parametrize("radius", [0.025, 0.036])
+def test_a_ball_of_another_size_gets_its_size_from_its_front(radius):
+    """The model's radius is 3 cm; a cap of the front is seen."""
+    spacing = 0.0025
+    axis = np.arange(-0.06, 0.06 + spacing, spacing)
+    nodes = np.stack(np.meshgrid(axis, axis, axis, indexing="ij"), axis=-1)
+    distance = (np.linalg.norm(nodes, axis=-1) - 0.03).astype(np.float32)
+    field = DistanceField(np.full(3, axis[0]), spacing, distance)
+    nothing = np.zeros((0, 3))
+    ball = Model(with_field(example("ball"), field, half_extent=1.0), nothing, nothing)
+    directions = np.random.default_rng(0).normal(size=(2000, 3))
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    center = np.array([0.1, 0.0, 0.7])
+    observed = center + radius * directions[directions[:, 2] < -0.3]
+    start = similarity(translation=-center + [0.003, -0.002, 0.004])
+    (found,) = refine_to_sdf(start[None], observed, ball, 0.03, 25, resize=True)
+    assert size_of(found) * 0.03 == pytest.approx(radius, rel=0.01)
+    # A ball's middle is where its surface says.
+    np.testing.assert_allclose(transform_points(found, center), 0, atol=3e-4)
+
+
+def test_without_resizing_a_placement_keeps_its_size(model, surface):
+    """Though another would fit better."""
+    (found,) = refine_to_sdf(np.eye(4)[None], 1.2 * surface, model, 0.03, 15)
+    assert size_of(found) == pytest.approx(1.0, abs=1e-9)
+    (resized,) = refine_to_sdf(np.eye(4)[None], 1.2 * surface, model, 0.03, 15, resize=True)
+    assert size_of(resized) == pytest.approx(1.2, rel=0.01)
+
+
 CONFIG = RegistrationConfig(iterations=3000)
 
 
