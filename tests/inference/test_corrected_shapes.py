@@ -15,7 +15,9 @@ from brrp_cli.geometry import transform_points
 from brrp_cli.inference.infer_hypotheses import Problem, SoftSamples, infer_correction
 from brrp_cli.observation.ray_samples import observe
 from brrp_cli.observation.soft_samples import depth_deviation, soft_samples
+from brrp_cli.raycast import inside
 from brrp_cli.shapes import solids
+from brrp_cli.surface.extract import extract_surface
 from brrp_cli.surface.stored_mesh import moved_mesh
 
 ID = 5
@@ -90,23 +92,28 @@ def test_a_thin_wall_keeps_its_thickness(cups):
     assert middle.any()
     # Points in the middle of the wall are inside, all around, points on either side are not.
     angle, height = np.random.default_rng(0).uniform([0, 0.01], [2 * np.pi, 0.07], (300, 2)).T
-    for radius, inside in ((0.03425, True), (0.0375, False), (0.031, False)):
+    for radius, in_wall in ((0.03425, True), (0.0375, False), (0.031, False)):
         points = np.column_stack([radius * np.cos(angle), radius * np.sin(angle), height])
         found = cups.probability(transform_points(T, points)) > 0.5
-        np.testing.assert_array_equal(found, inside)
+        np.testing.assert_array_equal(found, in_wall)
     assert CUP_WALL == 0.0015
 
 
-def test_a_step_that_is_not_there_is_taken_away_and_nothing_else():
-    posterior = corrected(notched(), block())
+@pytest.fixture(scope="module")
+def contradicted():
+    return corrected(notched(), block())
+
+
+def test_a_step_that_is_not_there_is_taken_away_and_nothing_else(contradicted):
+    posterior = contradicted
     rng = np.random.default_rng(0)
     # In the middle of what is missing, half way down.
     missing = rng.uniform([0.02, -0.03, 0.083], [0.045, 0.03, 0.092], (200, 3))
     assert (posterior.probability(transform_points(T, missing)) < 0.5).mean() > 0.95
     kept = rng.uniform([-0.055, -0.045, 0.005], [-0.025, 0.045, 0.095], (200, 3))
     below = rng.uniform([0.01, -0.045, 0.005], [0.055, 0.045, 0.055], (200, 3))
-    for inside in (kept, below):
-        assert (posterior.probability(transform_points(T, inside)) > 0.5).all()
+    for solid in (kept, below):
+        assert (posterior.probability(transform_points(T, solid)) > 0.5).all()
     # Away from the step the surface stays where it is.
     vertices = transform_points(np.linalg.inv(T), posterior.means[0].vertices)
     offset, moved = offsets(posterior)
@@ -115,8 +122,22 @@ def test_a_step_that_is_not_there_is_taken_away_and_nothing_else():
     assert moved.off > 0.05, "the mesh cannot be moved so far"
 
 
-def test_the_hidden_side_of_a_contradicted_shape_stays():
-    posterior = corrected(notched(), block())
+def test_the_surface_is_that_of_what_is_there(contradicted):
+    """Marching cubes, where the mesh cannot follow; the hidden sides are the model's."""
+    true = in_camera(notched(), T)
+    surface = extract_surface(contradicted, true.vertices, SurfaceConfig()).as_trimesh()
+    points = np.random.default_rng(0).uniform(*in_camera(block(), T).bounds, (20_000, 3))
+
+    def iou(mesh):
+        found, right = inside(mesh, points), inside(true, points)
+        return (found & right).sum() / (found | right).sum()
+
+    assert surface.is_watertight and surface.body_count == 1
+    assert iou(surface) > max(0.93, iou(in_camera(block(), T)) + 0.04)
+
+
+def test_the_hidden_side_of_a_contradicted_shape_stays(contradicted):
+    posterior = contradicted
     vertices = transform_points(np.linalg.inv(T), posterior.means[0].vertices)
     offset, _ = offsets(posterior)
     bottom = (vertices[:, 2] < 1e-6) & (np.abs(vertices[:, :2]) < 0.8 * SIZE[:2] / 2).all(axis=1)
