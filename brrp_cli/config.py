@@ -100,6 +100,9 @@ class SurfaceConfig:
     `spacing`.
     keep_distance : metres; a component of the level set further from every observed point is
     hallucinated
+    seen_share : of the observed points that a part near them must own to be joined to the largest,
+    a tenth of it where the part has a share `volume_share` of the largest's volume; route_radius :
+    metres, of what joins them, which is two nodes thick at least
     """
 
     level: float = 0.5
@@ -107,6 +110,9 @@ class SurfaceConfig:
     finest: float = 0.002
     nodes: int = 300_000
     keep_distance: float = 0.01
+    seen_share: float = 0.03
+    volume_share: float = 0.1
+    route_radius: float = 0.003
     farthest: float = 0.004
     wall_share: float = 0.4
     steps: int = 17
@@ -211,7 +217,7 @@ class MeanConfig:
     """
 
     nodes: int = 200_000
-    width: float = 0.001
+    width: float = 0.0005
     sure: float = 0.9
     doubt: float = 0.01
     limit: float = 5.0

@@ -29,7 +29,7 @@ from brrp_cli.retrieval.illuminants import lights, local_lights, log_prior
 from brrp_cli.retrieval.observed_appearance import see_object
 from brrp_cli.retrieval.score_fusion import believe
 from brrp_cli.retrieval.shortlist import Shortlist
-from brrp_cli.retrieval.similarity import alignment_score, lit_histograms
+from brrp_cli.retrieval.similarity import lit_histograms, similarity
 
 
 @click.command()
@@ -61,7 +61,7 @@ def main(prior_path: Path, frame_path: Path) -> None:
         histograms = lit_histograms(seen, gains)
         clock.append(time.process_time())
         rows = shortlist.rows(seen, histograms)
-        found.append(alignment_score(seen, histograms, looks.rows(rows), rows, len(gains)))
+        found.append(similarity(seen, histograms, looks.rows(rows), rows, len(gains)))
         clock.append(time.process_time())
         for stage, spent in zip(seconds, np.diff(clock), strict=True):
             seconds[stage] += float(spent)

@@ -168,8 +168,10 @@ def command(
     )
     result = evaluate(request, say=note)
     for summary in result.summaries:
-        iou, chamfer = summary.figures["iou"], summary.figures["chamfer"]
-        figures = f"IoU {iou.value:.3f}  Chamfer {chamfer.value * 100:.2f} cm"
+        distance, f_score = summary.figures["surface_distance"], summary.figures["f_score_5mm"]
+        figures = f"distance {distance.value * 1000:.2f} mm  F(5 mm) {f_score.value:.3f}"
+        iou = summary.figures["iou"]
+        figures += f"  IoU as published {iou.value:.3f}"
         if not METHODS[summary.variant.method].gives_shapes:
             first, in_3 = summary.figures["true_first"], summary.figures["true_in_3"]
             figures = f"true object first {first.value:.3f}, among 3 {in_3.value:.3f}"

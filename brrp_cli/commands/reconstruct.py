@@ -21,6 +21,7 @@ from brrp_cli.commands.method_options import (
 from brrp_cli.commands.retriever_option import RetrieverName
 from brrp_cli.commands.source_options import SourceOptions, source_options
 from brrp_cli.commands.view import PAGE, title, view
+from brrp_cli.files import atomic_path
 from brrp_cli.methods.registry import DEFAULT, METHODS, preset_names, reconstructing
 from brrp_cli.planning.options import PlanOptions
 from brrp_cli.planning.parts import HOW, check_available
@@ -32,10 +33,13 @@ if TYPE_CHECKING:
     from brrp_cli.frames.frame import Frame
     from brrp_cli.methods.base import Method
     from brrp_cli.prior.store import Prior
-    from brrp_cli.reconstruction import Reconstruction
+    from brrp_cli.reconstruction import ObjectReconstruction, Reconstruction
     from brrp_cli.retrieval.base import Retriever
 
 SOME_FAILED = 3
+POSES = "poses_bop.csv"
+# A size that differs by less is told as the object's own.
+OWN_SIZE = 0.005
 NO_COLLISION = "none"
 
 
@@ -90,6 +94,11 @@ NO_COLLISION = "none"
     type=CONFIDENCE,
     help="With --collision: shapes inside which each object lies with this probability.",
 )
+@click.option(
+    "--poses",
+    type=click.Choice(["bop"]),
+    help=f"Also the 6D poses of recognised objects: OUT/{POSES}, a BOP results file.",
+)
 @click.option("--html", is_flag=True, help=f"Also what `brrp view` writes, OUT/{PAGE}.")
 @click.option("--view", "open_it", is_flag=True, help="The same, and open it in a browser.")
 @click.option("--overwrite", is_flag=True, help="Replace the output folder if it is there.")
@@ -109,6 +118,7 @@ def command(
     workers: int | None,
     collision: str,
     confidence: float | None,
+    poses: str | None,
     html: bool,
     open_it: bool,
     overwrite: bool,
@@ -131,8 +141,10 @@ def command(
       brrp reconstruct frame.npz --method vprism
       brrp reconstruct frame.npz --method pointsdf --weights prior.safetensors
       brrp reconstruct frame.npz --collision coacd --confidence 0.95
+      brrp reconstruct frame.npz --prior prior/ --poses bop
     """
     from brrp_cli.api import open_result, reconstruct
+    from brrp_cli.results.bop import bop_csv
     from brrp_cli.results.write import check_output, write_results
 
     source.check()
@@ -166,11 +178,16 @@ def command(
     write_results(result, output, frame=coordinates, overwrite=overwrite)
     report(result)
     done = len(result.reconstructed)
+    recognised = sum(item.recognised is not None for item in result.objects)
     meshes = "object_*.ply, scene.glb, " if done else "no mesh: result.json says why; "
     click.echo(
         f"Wrote {done} of {len(result.objects)} objects, metres, {coordinates} frame: {output}/ "
         f"({meshes}posterior.h5, result.json, preview.png)"
     )
+    if poses is not None:
+        with atomic_path(output / POSES) as path:
+            path.write_text(bop_csv(result, [] if prior is None else prior.names))
+        click.echo(f"Wrote the poses of {recognised} recognised objects: {output / POSES}")
     if done and collision != NO_COLLISION:
         options = PlanOptions(collision, confidence, seed=seed)
         export(open_result(output), None, options, overwrite=False)
@@ -237,10 +254,22 @@ def open_prior_of(
 def report(result: Reconstruction) -> None:
     """Print a line for each object."""
     for item in result.objects:
-        best = item.retrieved[0] if item.retrieved else None
-        match = f"{best.name} {best.probability:.2f}" if best else ""
-        if item.unknown_probability >= 0.5:
-            match += f" (not in the prior: {item.unknown_probability:.2f})"
+        match = outcome(item)
         seconds = f"{sum(item.seconds.values()):.1f} s" if item.seconds else ""
         text = "; ".join(part for part in (match, item.message, seconds) if part)
         note(f"  object {item.object_id}: {item.status}  {text}")
+
+
+def outcome(item: ObjectReconstruction) -> str:
+    """What the object was taken for, with its weight; of the paper's preset, what was retrieved."""
+    found = item.recognised
+    if found is not None:
+        size = found.size_factor or 1.0
+        other = "" if abs(size - 1) < OWN_SIZE else f", {size:.2f} of its size"
+        return f"{found.name} (weight {found.weight:.2f}{other})"
+    best = item.retrieved[0] if item.retrieved else None
+    if best is None:
+        return ""
+    if item.unknown_weight is not None:
+        return f"not in the prior (weight {item.unknown_weight:.2f}; most like {best.name})"
+    return f"{best.name} (retrieved with {best.probability:.2f})"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import wraps
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -48,14 +49,12 @@ def source_options(function: Callable[..., Any]) -> Callable[..., Any]:
     names = ["color", "depth", "intrinsics", "masks", "index", "color_topic", "depth_topic"]
     names += ["depth_scale", "prompt", "masks_dir"]
 
+    # Its help, and the options that decorators below have left there, come along.
+    @wraps(function)
     def command(**values: Any) -> Any:
         options = SourceOptions(values.pop("path"), **{name: values.pop(name) for name in names})
         return function(source=options, **values)
 
-    # Click reads the help, and the options that decorators below have left, from the function.
-    command.__doc__ = function.__doc__
-    command.__name__ = function.__name__
-    command.__click_params__ = getattr(function, "__click_params__", [])  # type: ignore[attr-defined]
     wrapped: Callable[..., Any] = command
     for option in reversed(_OPTIONS):
         wrapped = option(wrapped)

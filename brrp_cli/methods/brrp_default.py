@@ -206,10 +206,12 @@ def _retrieved(name: str, probability: float, group: list[Hypothesis], weight: f
     if not group:
         return Retrieved(name, probability, weight=weight)
     best = group[0]
+    T_cam_mesh, _ = best.model.stored.mesh_pose(best.T_cam_object)
     return Retrieved(
         name,
         probability,
         best.T_cam_object,
+        T_cam_mesh,
         best.scale,
         alignment_score=best.alignment_score,
         weight=weight,

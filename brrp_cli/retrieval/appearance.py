@@ -21,7 +21,7 @@ from brrp_cli.retrieval.illuminants import lights, local_lights, log_prior
 from brrp_cli.retrieval.observed_appearance import see_object
 from brrp_cli.retrieval.score_fusion import Similarity, believe
 from brrp_cli.retrieval.shortlist import Shortlist
-from brrp_cli.retrieval.similarity import evidence, lit_histograms
+from brrp_cli.retrieval.similarity import lit_histograms, similarity
 
 
 class AppearanceRetriever:
@@ -69,7 +69,7 @@ class AppearanceRetriever:
             histograms = lit_histograms(seen, self._gains)
             rows = self._shortlist.rows(seen, histograms)
             stored = self._looks.rows(rows)
-            found[object_id] = evidence(seen, histograms, stored, rows, len(self._gains))
+            found[object_id] = similarity(seen, histograms, stored, rows, len(self._gains))
         return found
 
     def plane(self, frame: Frame) -> Plane | None:

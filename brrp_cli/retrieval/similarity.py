@@ -66,7 +66,7 @@ def size_penalty(
     return np.asarray(-np.nanmin(against, axis=-1) / 2, dtype=np.float32)
 
 
-def evidence(
+def similarity(
     seen: SeenObject,
     histograms: NDArray[np.floating] | None,
     stored: NDArray[Any],

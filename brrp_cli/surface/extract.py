@@ -12,7 +12,8 @@ from brrp_cli.errors import BrrpError
 from brrp_cli.finite import check_finite
 from brrp_cli.inference.hypothesis_posterior import HypothesisPosterior
 from brrp_cli.reconstruction import Axes, OccupancyPosterior, Surface
-from brrp_cli.surface.stored_mesh import moved_mesh
+from brrp_cli.surface.connect import one_piece
+from brrp_cli.surface.stored_mesh import along_normals, moved_to_level, placed
 
 # How far, at least, the occupancy of what is inside lies above the level: 10 micrometres.
 _CLEAR = 1e-3
@@ -39,11 +40,17 @@ def extract_surface(
     if the posterior is not finite, or wider than any object.
     """
     if isinstance(posterior, HypothesisPosterior) and posterior.dominant is not None:
-        moved = moved_mesh(posterior, posterior.dominant, config)
+        through = along_normals(posterior, posterior.dominant, config)
+        moved = moved_to_level(through, config.level)
         check_finite("The surface", vertices=moved.vertices, uncertainty=moved.deviation)
         if moved.off <= config.most_off:
+            shape = placed(posterior, posterior.dominant).shape
             return Surface(
-                moved.vertices, moved.faces, moved.deviation, posterior.surface_unit, moved.colours
+                moved.vertices,
+                shape.faces.astype(np.int64),
+                moved.deviation,
+                posterior.surface_unit,
+                shape.colours,
             )
     spacing = grid_spacing(posterior.bounds, config)
     axes = grid_axes(posterior.bounds, spacing)
@@ -81,14 +88,14 @@ def level_set(
     config: SurfaceConfig,
 ) -> LevelSet | None:
     """Marching cubes at `level` on occupancy (nx, ny, nz) at the nodes of `axes`, metres, camera
-    frame; of the parts near a point of `observed` (n, 3) the largest is kept, without cavities that
-    nobody can see into. None if nothing is left.
+    frame: one piece (connect.py), which the points `observed` (n, 3) lie on. None if nothing is
+    left.
     """
     from skimage.measure import marching_cubes
 
     origin = np.array([axis[0] for axis in axes])
     spacing = float(axes[0][1] - axes[0][0])
-    kept = _one_part(volume >= level, (observed - origin) / spacing, spacing, config)
+    kept = one_piece(volume, level, (observed - origin) / spacing, spacing, config)
     if not kept.any():
         return None
     # What was dropped must not leave a surface; a border of zeros closes what touches the bounds.
@@ -111,30 +118,3 @@ def _check_size(size: NDArray[np.float64], spacing: float) -> None:
             found=" x ".join(f"{side:.2f}" for side in size) + " m",
             fix="take pixels of what lies behind it out of its mask",
         )
-
-
-def _one_part(
-    occupied: NDArray[np.bool_],
-    observed: NDArray[np.floating],
-    spacing: float,
-    config: SurfaceConfig,
-) -> NDArray[np.bool_]:
-    """The largest connected part of `occupied` that comes near an observed point (n, 3), in cells,
-    with its cavities filled."""
-    from scipy.ndimage import binary_fill_holes, distance_transform_edt
-    from skimage.measure import label
-
-    cells = np.rint(observed).astype(np.int64)
-    cells = cells[((cells >= 0) & (cells < occupied.shape)).all(axis=1)]
-    if not len(cells):
-        return np.zeros_like(occupied)
-    far = np.ones(occupied.shape, dtype=bool)
-    far[tuple(cells.T)] = False
-    near = distance_transform_edt(far) * spacing <= config.keep_distance
-    # Nodes that touch along an edge or at a corner are two pieces to marching cubes.
-    parts = label(occupied, connectivity=1)
-    candidates = np.unique(parts[near & occupied])
-    if not len(candidates):
-        return np.zeros_like(occupied)
-    sizes = np.bincount(parts.ravel())[candidates]
-    return np.asarray(binary_fill_holes(parts == candidates[np.argmax(sizes)]))

@@ -10,7 +10,13 @@ import trimesh
 from closed_shapes import CUP_WALL, at, cup
 from table_scene import in_camera, photograph, placed
 
-from brrp_cli.config import FittedMapConfig, ObservationConfig, SensorConfig, SurfaceConfig
+from brrp_cli.config import (
+    FittedMapConfig,
+    MeanConfig,
+    ObservationConfig,
+    SensorConfig,
+    SurfaceConfig,
+)
 from brrp_cli.geometry import transform_points
 from brrp_cli.inference.infer_hypotheses import Problem, SoftSamples, infer_correction
 from brrp_cli.observation.ray_samples import observe
@@ -18,7 +24,7 @@ from brrp_cli.observation.soft_samples import depth_deviation, soft_samples
 from brrp_cli.raycast import inside
 from brrp_cli.shapes import solids
 from brrp_cli.surface.extract import extract_surface
-from brrp_cli.surface.stored_mesh import moved_mesh
+from brrp_cli.surface.stored_mesh import along_normals, moved_to_level
 
 ID = 5
 MAP, SENSOR = FittedMapConfig(), SensorConfig()
@@ -47,7 +53,7 @@ def noisy(frame, seed=0):
     return replace(frame, points=points.astype(np.float32))
 
 
-def corrected(true, model, frame_of=noisy, width=0.001):
+def corrected(true, model, frame_of=noisy, width=MeanConfig().width):
     """The posterior of a frame of the solid `true` under the one hypothesis that it is `model`,
     which stands where the solid does."""
     frame = frame_of(photograph({ID: in_camera(true, T)}))
@@ -63,7 +69,7 @@ def corrected(true, model, frame_of=noisy, width=0.001):
 
 def offsets(posterior, config=SurfaceConfig()):  # noqa: B008, frozen
     """How far the mesh is moved along its normals, metres, and the mesh."""
-    moved = moved_mesh(posterior, 0, config)
+    moved = moved_to_level(along_normals(posterior, 0, config), config.level)
     shape = posterior.means[0]
     return np.einsum("ij,ij->i", moved.vertices - shape.vertices, shape.normals), moved
 
@@ -84,7 +90,7 @@ def test_noise_moves_no_surface_that_lies_where_the_model_says(cups):
 def test_a_thin_wall_keeps_its_thickness(cups):
     """Behind a wall of 1.5 mm lies free space, 4 mm behind what was measured of it."""
     _, moved = offsets(cups)
-    mesh = trimesh.Trimesh(moved.vertices, moved.faces, process=False)
+    mesh = trimesh.Trimesh(moved.vertices, cups.means[0].shape.faces, process=False)
     true = in_camera(cup(), T)
     assert mesh.is_watertight
     assert mesh.volume == pytest.approx(true.volume, rel=0.05)

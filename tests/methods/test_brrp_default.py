@@ -89,7 +89,7 @@ def test_the_best_placement_is_the_true_one(result, truth, folder):
     local = transform_points(np.linalg.inv(true), surface)
     radius, height = np.hypot(*local[:, :2].T), local[:, 2]
     assert radius.max() < 0.045 and height.min() > -0.005 and height.max() < 0.125
-    assert item.retrieved[0].scale == 1.0
+    assert item.retrieved[0].size_factor == 1.0
 
 
 def uncertainty(item):

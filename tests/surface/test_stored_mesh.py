@@ -16,7 +16,7 @@ from brrp_cli.inference.hypothesis_posterior import HypothesisPosterior
 from brrp_cli.inference.posterior import HilbertPosterior
 from brrp_cli.reconstruction import METRES
 from brrp_cli.surface.extract import extract_surface
-from brrp_cli.surface.stored_mesh import moved_mesh, wall_thickness
+from brrp_cli.surface.stored_mesh import along_normals, moved_to_level, wall_thickness
 
 CONFIG = SurfaceConfig()
 CENTER = np.array([0.1, -0.05, 0.8])
@@ -46,7 +46,12 @@ def corrected(means, logit=0.0, shares=None):
     return HypothesisPosterior(tuple(means), np.arange(len(means)), shares, correction, box)
 
 
-def along_normals(moved, shape):
+def moved_mesh(posterior, config=CONFIG):
+    """The first hypothesis's mesh at the level set of all of them."""
+    return moved_to_level(along_normals(posterior, 0, config), config.level)
+
+
+def offsets(moved, shape):
     """How far each vertex went outwards, metres; it goes nowhere else."""
     way = moved.vertices - shape.vertices
     offset = np.einsum("ij,ij->i", way, shape.normals)
@@ -56,10 +61,8 @@ def along_normals(moved, shape):
 
 def test_without_a_correction_it_is_the_placed_mesh(block, thin):
     for shape in (block, thin):
-        moved = moved_mesh(corrected([shape]), 0, CONFIG)
+        moved = moved_mesh(corrected([shape]))
         np.testing.assert_allclose(moved.vertices, shape.vertices, atol=1e-8)
-        np.testing.assert_array_equal(moved.faces, shape.shape.faces)
-        np.testing.assert_array_equal(moved.colours, shape.shape.colours)
         assert moved.off == 0
         # The spread of a logistic surface: pi s / sqrt(3).
         spread = np.pi * WIDTH / np.sqrt(3)
@@ -68,31 +71,31 @@ def test_without_a_correction_it_is_the_placed_mesh(block, thin):
 
 @pytest.mark.parametrize("logit", [-2.5, -1.0, 0.5, 2.0])
 def test_a_constant_correction_moves_it_by_its_width_times_the_logit(block, logit):
-    moved = moved_mesh(corrected([block], logit), 0, CONFIG)
-    np.testing.assert_allclose(along_normals(moved, block), WIDTH * logit, atol=2e-5)
+    moved = moved_mesh(corrected([block], logit))
+    np.testing.assert_allclose(offsets(moved, block), WIDTH * logit, atol=2e-5)
     assert moved.off == 0
 
 
 def test_a_softer_shape_is_moved_further(block):
     soft = replace(block, width=2 * WIDTH)
-    moved = moved_mesh(corrected([soft], 1.0), 0, CONFIG)
-    np.testing.assert_allclose(along_normals(moved, soft), 2 * WIDTH, atol=2e-5)
+    moved = moved_mesh(corrected([soft], 1.0))
+    np.testing.assert_allclose(offsets(moved, soft), 2 * WIDTH, atol=2e-5)
 
 
 def test_another_level_lies_further_out_or_in(block):
     for level in (0.2, 0.8):
-        moved = moved_mesh(corrected([block]), 0, replace(CONFIG, level=level))
+        moved = moved_mesh(corrected([block]), replace(CONFIG, level=level))
         expected = -WIDTH * np.log(level / (1 - level))
         # Between two of the places that are looked at, occupancy is taken for a straight line.
-        np.testing.assert_allclose(along_normals(moved, block), expected, atol=5e-5)
+        np.testing.assert_allclose(offsets(moved, block), expected, atol=5e-5)
 
 
 def test_what_the_level_set_lies_out_of_reach_of_is_counted(block):
     """A correction of 4.9 would move it by 4.9 mm, 4 mm is the most."""
     for sign in (1, -1):
-        moved = moved_mesh(corrected([block], sign * 4.9), 0, CONFIG)
+        moved = moved_mesh(corrected([block], sign * 4.9))
         assert moved.off == 1
-        np.testing.assert_allclose(along_normals(moved, block), sign * CONFIG.farthest, atol=1e-9)
+        np.testing.assert_allclose(offsets(moved, block), sign * CONFIG.farthest, atol=1e-9)
         assert (moved.deviation > 0.01).all(), "where it is not known, it is not sure"
 
 
@@ -114,11 +117,11 @@ def test_thickness_is_the_way_through_the_wall(block, thin):
 @pytest.mark.parametrize("logit", [-4.0, -0.7, 0.5, 4.0])
 def test_the_two_sides_of_a_wall_never_meet(thin, logit):
     """0.7 of 1.5 mm from either side would be 1.4 mm: neither may go by more than its share."""
-    moved = moved_mesh(corrected([thin], logit), 0, CONFIG)
-    offset = along_normals(moved, thin)
+    moved = moved_mesh(corrected([thin], logit))
+    offset = offsets(moved, thin)
     thickness = wall_thickness(thin)
     assert (offset >= -CONFIG.wall_share * thickness - 1e-9).all()
-    mesh = trimesh.Trimesh(moved.vertices, moved.faces, process=False)
+    mesh = trimesh.Trimesh(moved.vertices, thin.shape.faces, process=False)
     assert mesh.is_watertight and mesh.volume > 0
     original = trimesh.Trimesh(thin.vertices, thin.shape.faces, process=False)
     # A fifth of the wall is left at least, and between foot and rim no face is turned over.
@@ -133,16 +136,16 @@ def test_placements_are_averaged_as_probabilities(block):
     """Two placements of the same shape, 2 mm apart along its x axis: the surface lies between."""
     step = TURN @ np.array([0.002, 0, 0])
     other = replace(block, T_cam_shape=similarity(translation=step) @ block.T_cam_shape)
-    moved = moved_mesh(corrected([block, other]), 0, CONFIG)
+    moved = moved_mesh(corrected([block, other]))
     local = (block.vertices - CENTER) @ TURN
     flat = np.abs(local) > np.array([0.03, 0.025, 0.02]) - 1e-6
-    offset = along_normals(moved, block)
+    offset = offsets(moved, block)
     for sign in (1, -1):
         face = flat[:, 0] & (flat.sum(axis=1) == 1) & (sign * local[:, 0] > 0)
         np.testing.assert_allclose(offset[face], sign * 0.001, atol=5e-5)
         assert (moved.deviation[face] > moved.deviation[flat[:, 1] & ~flat[:, 0]].mean()).all()
-    heavier = moved_mesh(corrected([block, other], shares=(0.9, 0.1)), 0, CONFIG)
-    assert np.abs(along_normals(heavier, block)).max() < 0.0005
+    heavier = moved_mesh(corrected([block, other], shares=(0.9, 0.1)))
+    assert np.abs(offsets(heavier, block)).max() < 0.0005
 
 
 OBSERVED = CENTER[None]
