@@ -10,9 +10,8 @@ plates as that command draws, most of which fall upside down, a can looks hollow
 
 Scenes of `tools/make_scenes.py` without noise; three of four views are given the noise of a
 structured-light camera, one of four has masks that are shifted by two pixels. A third part takes
-only the objects whose names have one of these words. A point counts as inside when it is
-within `growth` of the true solid (MeanConfig in brrp_cli/config.py). Points that the frame shows to
-be empty are not asked. A tenth of the scenes is kept to validate. Writes
+only the objects whose names have one of these words. Labels are those of the exact solid. Points
+that the frame shows to be empty are not asked. A tenth of the scenes is kept to validate. Writes
 brrp_cli/completion/weights.npz.
 """
 
@@ -86,12 +85,9 @@ def _solid(mesh_path: str, data_root: Path) -> Any:
     )
 
 
-def _inside(points: NDArray[np.floating], solid: Any, growth: float) -> NDArray[np.bool_]:
+def _inside(points: NDArray[np.floating], solid: Any) -> NDArray[np.bool_]:
     query = import_open3d().core.Tensor(np.ascontiguousarray(points, dtype=np.float32))
-    distance = solid.compute_distance(query).numpy()
-    return np.asarray(
-        (solid.compute_occupancy(query, nsamples=3).numpy() > 0.5) | (distance < growth)
-    )
+    return np.asarray(solid.compute_occupancy(query, nsamples=3).numpy() > 0.5)
 
 
 def look(scene: Scene, data_root: Path, only: tuple[str, ...], views: int, seed: int) -> Examples:
@@ -129,10 +125,8 @@ def look(scene: Scene, data_root: Path, only: tuple[str, ...], views: int, seed:
             points = points[asked]
             T_object_cam = np.linalg.inv(true.T_world_object) @ frame.T_world_cam
             in_file = transform_points(T_object_cam, points)
-            scale = float(np.cbrt(np.linalg.det(true.T_world_object[:3, :3])))
             solid = _solid(true.mesh_path, data_root)
-            growth = _hypotheses().mean.growth / scale
-            found.append(Examples(point_features(points, part), _inside(in_file, solid, growth)))
+            found.append(Examples(point_features(points, part), _inside(in_file, solid)))
     return _together(found)
 
 

@@ -298,7 +298,9 @@ class FittedMapConfig:
     behind : metres behind and in front of the seen surface where it is sampled
     start : standard deviation of the particles' first weights
     stiffness : lambda_norm is so many times as large for a placed shape, which is known better than
-    a completed one; least_weight : hypotheses that weigh less are left out
+    a completed one; contradiction : a sample that a placed shape cannot explain by the noise counts
+    so many times, for there are few of them among all that was seen to be free around it;
+    least_weight : hypotheses that weigh less are left out
     """
 
     hinges: int = 1000
@@ -314,6 +316,7 @@ class FittedMapConfig:
     lambda_observed: float = 50.0
     lambda_norm: float = 0.5
     stiffness: float = 8.0
+    contradiction: float = 1000.0
     least_weight: float = 0.01
 
 
