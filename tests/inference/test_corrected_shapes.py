@@ -53,7 +53,10 @@ def noisy(frame, seed=0):
     return replace(frame, points=points.astype(np.float32))
 
 
-def corrected(true, model, frame_of=noisy, width=MeanConfig().width):
+WIDTH = MeanConfig().width
+
+
+def corrected(true, model, frame_of=noisy, width=WIDTH):
     """The posterior of a frame of the solid `true` under the one hypothesis that it is `model`,
     which stands where the solid does."""
     frame = frame_of(photograph({ID: in_camera(true, T)}))
