@@ -139,14 +139,14 @@ class SurfaceConfig:
     finest: float = 0.002
     nodes: int = 300_000
     keep_distance: float = 0.01
-    seen_share: float = 0.03
-    volume_share: float = 0.1
+    seen_share: float = share(0.03)
+    volume_share: float = share(0.1)
     route_radius: float = 0.003
     farthest: float = 0.004
-    wall_share: float = 0.4
+    wall_share: float = share(0.4)
     steps: int = 17
     fidelity: float = 0.0002
-    most_off: float = 0.05
+    most_off: float = share(0.05)
 
 
 @dataclass(frozen=True)
@@ -186,6 +186,13 @@ class SearchConfig:
     """
 
     turns: int = 24
+    model_points: int = 300
+    least_facing: int = 6
+    stray: float = share(0.02)
+    box_points: int = 600
+    hidden: float = 0.015
+    first_share: int = 3
+    first_factor: int = 2
     matchings: int = 4
     matching: RegistrationConfig = field(
         default_factory=lambda: RegistrationConfig(iterations=5_000)
@@ -317,7 +324,7 @@ class FittedMapConfig:
     lambda_norm: float = 0.5
     stiffness: float = 8.0
     contradiction: float = 1000.0
-    least_weight: float = 0.01
+    least_weight: float = share(0.01)
 
 
 @dataclass(frozen=True)
