@@ -6,8 +6,8 @@ SCENES of `tools/make_scenes.py` without noise; of four scenes three are given t
 structured-light camera, and one of those three has masks that are shifted by a pixel or two. A
 third part, SCENES:DATA_ROOT:can,bottle, takes only the objects whose names have one of these words.
 A point counts as inside when it is inside the exact mesh. Points that the frame shows to be empty
-are not asked. A tenth of the scenes is kept to validate. With `--examples`, what a set of scenes
-gives is kept in that folder, and not made again. Writes brrp_cli/completion/weights.npz.
+are not asked. A tenth of the scenes is kept to validate. With `--examples`, what a scene gives
+is kept in that folder, and not made again. Writes brrp_cli/completion/weights.npz.
 
 What the package holds was fitted on these scenes (`ycb` as in tools/make_scenes.py, `objects` the
 household objects of data_manifests/household_held_out.toml):
@@ -26,7 +26,7 @@ household objects of data_manifests/household_held_out.toml):
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from functools import cache, partial
@@ -50,6 +50,7 @@ from brrp_cli.completion.point_features import COUNT, WHOLE, point_features
 from brrp_cli.completion.visible_part import VisiblePart, visible_part
 from brrp_cli.config import HypothesesConfig, preset
 from brrp_cli.dependencies import import_open3d
+from brrp_cli.errors import MeshError
 from brrp_cli.evaluation.perturb import shift_masks, with_noise
 from brrp_cli.files import write_bytes
 from brrp_cli.frames.frame import BACKGROUND
@@ -94,10 +95,14 @@ def _hypotheses() -> HypothesesConfig:
 
 @cache
 def _solid(mesh_path: str, data_root: Path) -> Any:
-    """A ray casting scene with the object's closed mesh, metres, in the frame of its file."""
-    return raycasting_scene(
-        [repair(true_mesh(TrueObject(0, mesh_path, np.eye(4)), data_root)).mesh]
-    )
+    """A ray casting scene with the object's closed mesh, metres, in the frame of its file; None for
+    a mesh that cannot be closed."""
+    try:
+        mesh = repair(true_mesh(TrueObject(0, mesh_path, np.eye(4)), data_root)).mesh
+    except MeshError as error:
+        click.echo(f"{mesh_path}: left out: {error}")
+        return None
+    return raycasting_scene([mesh])
 
 
 def _inside(points: NDArray[np.floating], solid: Any) -> NDArray[np.bool_]:
@@ -128,13 +133,13 @@ def look(scene: Scene, data_root: Path, only: tuple[str, ...], views: int, seed:
         plane = fit_plane(ground, config.observation, seed, middle)
         for object_id, cloud in clouds.items():
             true = scene.object(object_id)
-            if only and not any(word in true.name for word in only):
+            solid = _solid(true.mesh_path, data_root)
+            if solid is None or (only and not any(word in true.name for word in only)):
                 continue
             part = visible_part(cloud, frame, object_id, plane, _hypotheses().completion)
             points = _asked(part, rng)
             points = points[~empty_space(points, frame, object_id, plane, _hypotheses().mean)]
             in_file = transform_points(np.linalg.inv(true.T_world_object) @ T_world_cam, points)
-            solid = _solid(true.mesh_path, data_root)
             found.append(
                 Examples(point_features(points, part).astype(np.float16), _inside(in_file, solid))
             )
@@ -167,43 +172,34 @@ def _together(found: list[Examples]) -> Examples:
     )
 
 
+def kept_look(scene: Scene, folder: Path | None, **options: Any) -> Examples:
+    """As `look`, kept in `folder`."""
+    path = None if folder is None else folder / f"{scene.name}.npz"
+    if path is not None and path.exists():
+        with np.load(path) as arrays:
+            return Examples(arrays["point_features"], arrays["inside"])
+    found = look(scene, **options)
+    if path is not None:
+        buffer = BytesIO()
+        np.savez(buffer, point_features=found.point_features, inside=found.inside)
+        write_bytes(path, buffer.getvalue())
+    return found
+
+
 def collect(
-    folder: Path, data_root: Path, only: tuple[str, ...], views: int, seed: int, workers: int
+    folder: Path, keep: Path | None, workers: int, **options: Any
 ) -> tuple[Examples, Examples]:
-    """To fit on and to validate with: the last tenth of the scenes."""
+    """To fit on and to validate with: the last tenth of the scenes. `options` are `look`'s."""
     scenes = find_scenes(folder)
-    job = partial(look, data_root=data_root, only=only, views=views, seed=seed)
+    kept = None if keep is None else keep / folder.name
+    job = partial(kept_look, folder=kept, **options)
     if workers == 1:
         all_of_them = [job(scene) for scene in tqdm(scenes, desc=folder.name)]
     else:
         with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
             all_of_them = list(tqdm(pool.map(job, scenes), total=len(scenes), desc=folder.name))
-    kept = max(1, len(scenes) // 10)
-    return _together(all_of_them[:-kept]), _together(all_of_them[-kept:])
-
-
-def kept_examples(
-    path: Path | None, make: Callable[[], tuple[Examples, Examples]]
-) -> tuple[Examples, Examples]:
-    """What `make` gives, kept at `path`."""
-    if path is None:
-        return make()
-    if not path.exists():
-        fitted, held = make()
-        buffer = BytesIO()
-        np.savez(
-            buffer,
-            fitted=fitted.point_features,
-            fitted_inside=fitted.inside,
-            held=held.point_features,
-            held_inside=held.inside,
-        )
-        write_bytes(path, buffer.getvalue())
-    with np.load(path) as arrays:
-        return (
-            Examples(arrays["fitted"], arrays["fitted_inside"]),
-            Examples(arrays["held"], arrays["held_inside"]),
-        )
+    last = max(1, len(scenes) // 10)
+    return _together(all_of_them[:-last]), _together(all_of_them[-last:])
 
 
 def fit(examples: Examples, held: Examples, epochs: int, seed: int) -> Network:
@@ -294,9 +290,15 @@ def main(
     for each in sets:
         folder, root, *words = each.split(":")
         only = tuple(word for part in words for word in part.split(","))
-        path = None if examples is None else examples / f"{Path(folder).name}.npz"
-        make = partial(collect, Path(folder), Path(root), only, views, seed, workers)
-        one, other = kept_examples(path, make)
+        one, other = collect(
+            Path(folder),
+            examples,
+            workers,
+            data_root=Path(root),
+            only=only,
+            views=views,
+            seed=seed,
+        )
         click.echo(f"{folder}: {len(one.inside)} points, {one.inside.mean():.3f} inside")
         fitted.append(one)
         held.append(other)

@@ -11,8 +11,9 @@ from brrp_cli.frames.frame import BACKGROUND, Frame
 
 Image = NDArray[np.float32]
 
-# Radii at which limbs are measured.
-WIDTHS = 12
+# Radii at which limbs are measured, and pixels along the longer side of the image that they are
+# measured in: a limb of a large silhouette is many pixels wide.
+WIDTHS, SIDE = 12, 100
 
 
 def silhouettes(frame: Frame, object_id: int) -> tuple[Image, Image]:
@@ -26,7 +27,7 @@ def silhouettes(frame: Frame, object_id: int) -> tuple[Image, Image]:
     )
     silhouette, limbs = np.zeros((2, *frame.shape), dtype=np.float32)
     silhouette[window] = within_silhouette(frame.segmap[window])
-    limbs[window] = local_thickness(silhouette[window])
+    limbs[window] = _thinned_thickness(silhouette[window])
     return silhouette, limbs
 
 
@@ -35,6 +36,17 @@ def within_silhouette(segmap: NDArray[np.integer]) -> Image:
     another object hides may go on."""
     ground = np.pad(segmap == BACKGROUND, 1, constant_values=True)
     return distance_transform_edt(~ground)[1:-1, 1:-1].astype(np.float32)
+
+
+def _thinned_thickness(within: Image) -> Image:
+    """`local_thickness` of every so many pixels, repeated."""
+    step = 1 + max(within.shape) // SIDE
+    if step == 1:
+        return local_thickness(within)
+    thick = local_thickness(within[::step, ::step] / step) * step
+    rows, columns = within.shape
+    repeated = thick.repeat(step, axis=0)[:rows].repeat(step, axis=1)[:, :columns]
+    return np.where(within > 0, repeated, 0).astype(np.float32)
 
 
 def local_thickness(within: Image) -> Image:
