@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 # Turns of the rectangle that are tried, over a quarter of a circle.
-TURNS = 30
+TURNS = 24
 # Shares of the points between which the rectangle lies: strays do not count.
 MOST = (0.01, 0.99)
 # No side of a rectangle is shorter, metres.
@@ -37,20 +37,30 @@ class Footprint:
 
 
 def footprint(points: Array) -> Footprint:
-    """The rectangle of least area about points (n, 2), metres."""
+    """The rectangle about points (n, 2), metres, that is small and has the points near its sides.
+
+    Area alone does not tell: two sides of a box fit as tightly with their diagonal along a side.
+    """
     few = points[:: max(1, len(points) // POINTS)]
-    angles = np.linspace(0, np.pi / 2, TURNS, endpoint=False)
-    turned = np.stack([np.cos(angles), np.sin(angles)], axis=1)  # (t, 2)
-    along = few @ turned.T
-    across = few @ np.stack([-turned[:, 1], turned[:, 0]])
-    sides = [
-        np.maximum(np.ptp(np.quantile(each, MOST, axis=0), axis=0), LEAST)
-        for each in (along, across)
-    ]
-    best = turned[np.argmin(sides[0] * sides[1])]
-    axes = np.array([best, [-best[1], best[0]]])
+    step = np.pi / 2 / TURNS
+    angle = _best(few, step * np.arange(TURNS))
+    angle = _best(few, angle + step * np.linspace(-0.8, 0.8, 9))
+    axes = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
     low, high = np.quantile(points @ axes.T, MOST, axis=0)
     half = np.maximum(high - low, LEAST) / 2
     centre = (low + high) / 2 @ axes
     order = np.argsort(-half, kind="stable")
     return Footprint(centre, axes[order], half[order])
+
+
+def _best(points: Array, angles: Array) -> float:
+    """Which of some angles (t,) the rectangle about points (n, 2) has."""
+    along = np.stack([np.cos(angles), np.sin(angles)])
+    area, near = np.ones(len(angles)), []
+    for direction in (along, np.stack([-along[1], along[0]])):
+        coordinates = points @ direction  # (n, t)
+        low, high = np.quantile(coordinates, MOST, axis=0)
+        area *= np.maximum(high - low, LEAST)
+        near.append(np.minimum(np.abs(coordinates - low), np.abs(coordinates - high)))
+    within = np.minimum(*near).mean(axis=0) / np.sqrt(area)
+    return float(angles[np.argmin(np.log(area) + within)])

@@ -160,4 +160,5 @@ def _image(image: Array, part: VisiblePart) -> list[Array]:
     over = (
         np.full(len(image), -part.top) if part.height_map is None else part.height_map.above(image)
     )
-    return [behind, part.silhouette.ravel()[pixel] * metres, over]
+    within: Array = part.silhouette.ravel()[pixel] * metres
+    return [behind, within, over]
