@@ -53,7 +53,7 @@ def footprint(points: Array) -> Footprint:
     return Footprint(centre, axes[order], half[order])
 
 
-def _best(points: Array, angles: Array) -> float:
+def _best(points: Array, angles: NDArray[np.floating]) -> float:
     """Which of some angles (t,) the rectangle about points (n, 2) has."""
     along = np.stack([np.cos(angles), np.sin(angles)])
     area, near = np.ones(len(angles)), []

@@ -151,7 +151,7 @@ def _behind(
     return np.clip(np.nan_to_num(behind), -FAR, FAR)
 
 
-def _image(image: Array, part: VisiblePart) -> list[Array]:
+def _image(image: Array, part: VisiblePart) -> list[NDArray[np.floating]]:
     """Where the image (n, 3) of each point lies: behind what is seen, within the silhouette, over
     the height_map."""
     pixel, visible = pixel_numbers(image, part.frame)
@@ -160,5 +160,5 @@ def _image(image: Array, part: VisiblePart) -> list[Array]:
     over = (
         np.full(len(image), -part.top) if part.height_map is None else part.height_map.above(image)
     )
-    within: Array = part.silhouette.ravel()[pixel] * metres
+    within = part.silhouette.ravel()[pixel] * metres
     return [behind, within, over]
