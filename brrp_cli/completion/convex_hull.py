@@ -33,11 +33,11 @@ def outside_hull(points: Array, facets: Array) -> Array:
     # In float32 about the middle, and so many points at once that their products, one for each
     # facet, stay in the cache.
     middle = points.mean(axis=0)
-    near = (points - middle).astype(np.float32)
-    offsets = (facets[:, 3] + facets[:, :3] @ middle).astype(np.float32)
-    normals = np.ascontiguousarray(facets[:, :3].T, dtype=np.float32)
+    near = np.ascontiguousarray((points - middle).T, dtype=np.float32)
+    offsets = (facets[:, 3] + facets[:, :3] @ middle).astype(np.float32)[:, None]
+    normals = facets[:, :3].astype(np.float32)
     found = np.empty(len(points))
     for start in range(0, len(points), CHUNK):
-        rows = slice(start, start + CHUNK)
-        found[rows] = (near[rows] @ normals + offsets).max(axis=1)
+        chunk = slice(start, start + CHUNK)
+        found[chunk] = (normals @ near[:, chunk] + offsets).max(axis=0)
     return found

@@ -14,14 +14,18 @@ from scipy.spatial import cKDTree
 from brrp_cli.completion.convex_hull import outside_hull
 from brrp_cli.completion.visible_part import VisiblePart
 from brrp_cli.frames.frame import BACKGROUND
-from brrp_cli.frames.projection import at_pixels, depth_behind
+from brrp_cli.frames.projection import pixel_numbers
 from brrp_cli.geometry import transform_points
 
 Array = NDArray[np.float64]
 Features = NDArray[np.float32]
 
 # Lengths, of which the last are the object's own, the same at all points.
-COUNT, WHOLE = 52, 6
+COUNT, WHOLE = 72, 9
+# Steps to where free space is looked for, in the object's sizes.
+HIGHER, ASIDE = 0.3, 0.2
+# The label of what lies outside of the image.
+NOWHERE = np.iinfo(np.int64).min
 
 
 def point_features(points: Array, part: VisiblePart) -> Features:
@@ -29,17 +33,18 @@ def point_features(points: Array, part: VisiblePart) -> Features:
     the object's sizes; without a plane, heights count as in the middle of the object."""
     frame, size, config = part.frame, part.size, part.config
     far, ratio, thin = config.far, config.ratio, config.thin
-    behind = np.clip(np.nan_to_num(-depth_behind(points, frame)), -far, far)
-    label = at_pixels(points, frame.segmap, frame)
-    own = label == part.object_id
-    ground = label == BACKGROUND
+    pixel, visible = pixel_numbers(points, frame)
+    label = np.where(visible, frame.segmap.ravel()[pixel], NOWHERE)
+    behind = _behind(points, pixel, visible, part)
     # From pixels to metres at the point's own depth.
-    pixel = np.maximum(points[:, 2], 0) / frame.K[0, 0]
-    silhouette = np.nan_to_num(at_pixels(points, part.silhouette, frame)) * pixel
-    local_thickness = np.nan_to_num(at_pixels(points, part.limbs, frame)) * pixel
+    metres = np.where(visible, points[:, 2] / frame.K[0, 0], 0.0)
+    silhouette = part.silhouette.ravel()[pixel] * metres
+    local_thickness = part.limbs.ravel()[pixel] * metres
 
     outside = outside_hull(points, part.facets)
     away, nearest = cKDTree(part.seen).query(points)
+    normal = part.normals[nearest]
+    upright = points @ part.up
     if part.plane is None or part.height_map is None:
         height = np.full(len(points), part.top)
         over_map = np.full(len(points), -part.top)
@@ -52,14 +57,15 @@ def point_features(points: Array, part: VisiblePart) -> Features:
         beside, _ = cKDTree(transform_points(T, part.seen)[:, :2]).query(
             transform_points(T, points)[:, :2]
         )
-        lower = (part.seen[nearest] - points) @ part.plane.normal
+        lower = part.seen[nearest] @ part.up - upright
     # As if what is seen were the front of something round.
-    across = points @ part.across - part.middle
-    ahead = points @ part.ahead - part.front
-    length = part.back - part.front
-    center = max(part.width, length) / 2
+    flat = np.stack([points @ part.across, points @ part.ahead], axis=1)
+    across, ahead = flat[:, 0] - part.middle, flat[:, 1] - part.front
+    length, center = part.back - part.front, part.center
     round_ = np.hypot(across, ahead - center)
-    along = ((points - part.seen[nearest]) * part.normals[nearest]).sum(axis=1)
+    outer, inner = part.profile.radii(upright)
+    along = ((points - part.seen[nearest]) * normal).sum(axis=1)
+    beside_seen = [_free_beside(points + step * size, part) for step in _steps(part)]
     each = [
         outside,
         away,
@@ -75,12 +81,21 @@ def point_features(points: Array, part: VisiblePart) -> Features:
         round_,
         local_thickness,
         along,
+        round_ - outer,
+        round_ - inner,
+        part.rectangle.outside(flat),
+        beside_seen[0],
+        beside_seen[1],
+        np.maximum(*beside_seen[2:]),
+        np.minimum(*beside_seen[2:]),
     ]
-    # Most things are the same from behind, or left and right.
+    # Most things are the same from behind, or left and right; boxes, from the other corner.
+    turn = 2 * (flat - part.rectangle.centre)
     mirrored = [
-        *_mirrored(points, 2 * (ahead - center), part.ahead, part),
-        *_mirrored(points, 2 * (ahead - length / 2), part.ahead, part),
-        *_mirrored(points, 2 * across, part.across, part),
+        *_image(points - 2 * (ahead - center)[:, None] * part.ahead, part),
+        *_image(points - 2 * (ahead - length / 2)[:, None] * part.ahead, part),
+        *_image(points - 2 * across[:, None] * part.across, part),
+        *_image(points - turn @ np.stack([part.across, part.ahead]), part),
     ]
     whole = [
         size / far,
@@ -89,32 +104,57 @@ def point_features(points: Array, part: VisiblePart) -> Features:
         length / size,
         part.depths.mean() / size,
         np.quantile(part.depths, config.most[1]) / size,
+        *(2 * part.rectangle.half / size),
+        part.free,
     ]
     columns = [np.clip(one / size, -ratio, ratio) for one in each + mirrored]
     columns += [np.clip(one, -far, far) / (far / 10) for one in each]
     columns += [
-        own,
-        ground,
+        label == part.object_id,
+        label == BACKGROUND,
         np.clip(behind / (silhouette + thin), -ratio, ratio),
         np.clip(height / max(part.top, config.least), -1, ratio),
         np.clip(round_ / center, 0, ratio),
         np.clip(behind / (local_thickness + thin), -ratio, ratio),
-        part.normals[nearest] @ part.ahead,
-        np.abs(part.normals[nearest] @ part.across),
-        part.normals[nearest] @ part.up,
+        normal @ part.ahead,
+        np.abs(normal @ part.across),
+        normal @ part.up,
     ]
     columns += [np.full(len(points), one) for one in whole]
     return np.stack(columns, axis=1).astype(np.float32)
 
 
-def _mirrored(points: Array, twice: Array, direction: Array, part: VisiblePart) -> list[Array]:
-    """Where each point's image lies, `twice` its distance from the mirror back along the unit
-    `direction`: behind what is seen, within the silhouette, over the height_map."""
-    far = part.config.far
-    image = points - twice[:, None] * direction
-    behind = np.clip(np.nan_to_num(-depth_behind(image, part.frame)), -far, far)
-    silhouette = np.nan_to_num(at_pixels(image, part.silhouette, part.frame))
+def _steps(part: VisiblePart) -> list[NDArray[np.floating]]:
+    """Where, in the object's sizes, one looks whether free space is seen beside a point."""
+    return [
+        HIGHER * part.up,
+        (HIGHER / 3) * part.up,
+        ASIDE * part.across,
+        -ASIDE * part.across,
+    ]
+
+
+def _free_beside(points: Array, part: VisiblePart) -> Array:
+    return _behind(points, *pixel_numbers(points, part.frame), part)
+
+
+def _behind(
+    points: Array, pixel: NDArray[np.int64], visible: NDArray[np.bool_], part: VisiblePart
+) -> Array:
+    """How far (n,) points (n, 3) lie behind the measured depth, metres; 0 where there is none."""
+    measured = part.frame.points[..., 2].ravel()[pixel]
+    behind = np.where(visible, points[:, 2] - measured, 0.0)
+    return np.clip(np.nan_to_num(behind), -part.config.far, part.config.far)
+
+
+def _image(image: Array, part: VisiblePart) -> list[NDArray[np.floating]]:
+    """Where the image (n, 3) of each point lies: behind what is seen, within the silhouette, over
+    the height_map."""
+    pixel, visible = pixel_numbers(image, part.frame)
+    behind = _behind(image, pixel, visible, part)
+    metres = np.where(visible, image[:, 2] / part.frame.K[0, 0], 0.0)
     over = (
-        np.full(len(points), -part.top) if part.height_map is None else part.height_map.above(image)
+        np.full(len(image), -part.top) if part.height_map is None else part.height_map.above(image)
     )
-    return [behind, silhouette * np.maximum(image[:, 2], 0) / part.frame.K[0, 0], over]
+    within = part.silhouette.ravel()[pixel] * metres
+    return [behind, within, over]

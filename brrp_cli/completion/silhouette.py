@@ -11,6 +11,10 @@ from brrp_cli.frames.frame import BACKGROUND, Frame
 
 Image = NDArray[np.float32]
 
+# Pixels along the longer side of the image that limbs are measured in: a limb of a large silhouette
+# is many pixels wide.
+SIDE = 100
+
 
 def silhouettes(frame: Frame, object_id: int, radii: int) -> tuple[Image, Image]:
     """`within_silhouette` and `local_thickness` (H, W) where the object is or may
@@ -23,7 +27,7 @@ def silhouettes(frame: Frame, object_id: int, radii: int) -> tuple[Image, Image]
     )
     silhouette, limbs = np.zeros((2, *frame.shape), dtype=np.float32)
     silhouette[window] = within_silhouette(frame.segmap[window])
-    limbs[window] = local_thickness(silhouette[window], radii)
+    limbs[window] = _thinned_thickness(silhouette[window], radii)
     return silhouette, limbs
 
 
@@ -32,6 +36,17 @@ def within_silhouette(segmap: NDArray[np.integer]) -> Image:
     another object hides may go on."""
     ground = np.pad(segmap == BACKGROUND, 1, constant_values=True)
     return distance_transform_edt(~ground)[1:-1, 1:-1].astype(np.float32)
+
+
+def _thinned_thickness(within: Image, radii: int) -> Image:
+    """`local_thickness` of every so many pixels, repeated."""
+    step = 1 + max(within.shape) // SIDE
+    if step == 1:
+        return local_thickness(within, radii)
+    thick = local_thickness(within[::step, ::step] / step, radii) * step
+    rows, columns = within.shape
+    repeated = thick.repeat(step, axis=0)[:rows].repeat(step, axis=1)[:, :columns]
+    return np.where(within > 0, repeated, 0).astype(np.float32)
 
 
 def local_thickness(within: Image, radii: int) -> Image:

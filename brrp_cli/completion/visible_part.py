@@ -9,10 +9,13 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from brrp_cli.completion.convex_hull import hull_facets, outside_hull
+from brrp_cli.completion.footprint import Footprint, footprint
 from brrp_cli.completion.height_map import HeightMap, height_map_over
+from brrp_cli.completion.radial_profile import RadialProfile, radial_profile
 from brrp_cli.completion.silhouette import Image, silhouettes
 from brrp_cli.config import CompletionConfig
 from brrp_cli.frames.frame import Frame
+from brrp_cli.frames.projection import depth_behind
 from brrp_cli.geometry import normalise
 from brrp_cli.observation.subsample import grid_subsample
 from brrp_cli.observation.support_plane import Plane
@@ -21,6 +24,9 @@ Array = NDArray[np.float64]
 
 # Of the image: as good a guess as any where there is no plane.
 UPRIGHT = np.array([0.0, -1.0, 0.0])
+# Pairs of seen points between which one looks for free space, and how far in front of the measured
+# depth that begins, metres.
+PAIRS, FREE = 1000, 0.006
 
 
 @dataclass(frozen=True)
@@ -35,6 +41,10 @@ class VisiblePart:
     back : where the seen points begin and end ahead; middle, width : of them across
     depths : (n,) how deep the seen points lie in the hull: much of a cup's inside does
     normals : (n, 3) of the seen points, unit, towards the camera
+    rectangle : along `across` and `ahead`, of what is seen; profile : about the upright axis in the
+    middle of a round thing with that front and width, heights along `up`
+    free : share of the points halfway between two seen ones that are seen to be free: none in a
+    solid block, a third in a bowl that is looked into
     silhouette, limbs : (H, W) pixels, of silhouette.py
     """
 
@@ -55,6 +65,9 @@ class VisiblePart:
     width: float
     depths: Array
     normals: Array
+    rectangle: Footprint
+    profile: RadialProfile
+    free: float
     silhouette: Image
     limbs: Image
     config: CompletionConfig
@@ -63,6 +76,11 @@ class VisiblePart:
     def up(self) -> Array:
         """(3,) unit, away from the plane."""
         return UPRIGHT if self.plane is None else self.plane.normal
+
+    @property
+    def center(self) -> float:
+        """How far behind the front the middle of something round is."""
+        return max(self.width, self.back - self.front) / 2
 
     @property
     def extent(self) -> Array:
@@ -96,6 +114,12 @@ def visible_part(
     ahead = np.cross(across, up)
     front, back = np.quantile(seen @ ahead, config.most)
     left, right = np.quantile(seen @ across, config.most)
+    width = max(float(right - left), config.least)
+    normals = surface_normals(seen, config.neighbours)
+    x = seen @ across - (left + right) / 2
+    y = seen @ ahead - front - max(width, float(back - front)) / 2
+    radii = np.maximum(np.hypot(x, y), config.least / 10)
+    outward = (x * (normals @ across) + y * (normals @ ahead)) / radii
     return VisiblePart(
         frame=frame,
         object_id=object_id,
@@ -111,9 +135,12 @@ def visible_part(
         front=float(front),
         back=float(back),
         middle=float(left + right) / 2,
-        width=max(float(right - left), config.least),
+        width=width,
         depths=-outside_hull(seen, facets),
-        normals=surface_normals(seen, config.neighbours),
+        normals=normals,
+        rectangle=footprint(np.stack([seen @ across, seen @ ahead], axis=1)),
+        profile=radial_profile(seen @ up, radii, outward),
+        free=_free_between(seen, frame),
         silhouette=silhouette,
         limbs=limbs,
         config=config,
@@ -130,3 +157,10 @@ def surface_normals(seen: Array, neighbours: int) -> Array:
     normals = directions[:, :, 0]
     away = (normals * seen).sum(axis=1, keepdims=True) > 0
     return np.where(away, -normals, normals)
+
+
+def _free_between(seen: Array, frame: Frame) -> float:
+    """Share of the points halfway between two of `seen` (n, 3) that are seen to be free."""
+    pairs = np.random.default_rng(0).integers(len(seen), size=(2, PAIRS))
+    behind = depth_behind(seen[pairs].mean(axis=0), frame)
+    return float((np.nan_to_num(behind, nan=0.0) > FREE).mean())

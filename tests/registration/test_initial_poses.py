@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from table_scene import NORMAL, TABLE, box, in_camera, photograph, placed, stored
 
-from brrp_cli.config import FeatureConfig, RegistrationConfig
+from brrp_cli.config import FeatureConfig, RegistrationConfig, SearchConfig
 from brrp_cli.geometry import normalise, transform_points
 from brrp_cli.observation.support_plane import Plane, plane_frame
 from brrp_cli.registration.initial_poses import feature_matched_poses, resting_initial_poses
