@@ -25,6 +25,10 @@ from brrp_cli.segmentation.smooth_depth import flying_pixels, smooth_depth
 from brrp_cli.segmentation.table_plane import find_table
 
 
+# Of the image, that must have depth which agrees with its neighbours'.
+MIN_SHARE = 0.01
+
+
 @dataclass(frozen=True)
 class SegmentConfig:
     """Lengths are metres.
@@ -63,6 +67,15 @@ def segment(frame: Frame, seed: int = 0, config: SegmentConfig | None = None) ->
     depth = smooth_depth(np.where(flying_pixels(raw), np.nan, raw))
     points = backproject(depth, frame.K).astype(np.float64)
     valid = np.isfinite(depth)
+    if valid.sum() < MIN_SHARE * valid.size:
+        raise FrameError(
+            "Too little depth to find objects in",
+            where=frame.source,
+            expected=f"depth that neighbours agree on, at {MIN_SHARE:.0%} of the pixels or more",
+            found=f"{int(frame.valid.sum())} of {valid.size} pixels have depth,"
+            f" {int(valid.sum())} of them agree with their neighbours",
+            fix="check the depth image and its unit; masks made elsewhere go in by --masks",
+        )
     table = find_table(points[valid], seed, frame.source)
     height = table.plane.signed_distance(points)
     plan = table.plan(points)
