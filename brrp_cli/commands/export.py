@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from brrp_cli.planning.options import DENSITY, PlanOptions
-from brrp_cli.planning.parts import COACD, HOW
+from brrp_cli.planning.parts import COACD, HOW, check_available
 from brrp_cli.progress import note
 
 if TYPE_CHECKING:
@@ -77,6 +77,7 @@ def command(
 
     if margin and confidence is None:
         raise click.UsageError("--margin grows the shapes of --confidence, so give both")
+    check_available(collision)
     options = PlanOptions(collision, confidence, margin / 1000, density, seed)
     export(open_result(results), output, options, overwrite=overwrite)
 

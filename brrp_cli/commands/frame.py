@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from shlex import quote
 
 import click
 
@@ -77,5 +78,5 @@ def tell(shape: tuple[int, int], objects: int, output: Path, picture: Path | Non
     plural = "" if objects == 1 else "s"
     click.echo(
         f"Wrote {output} ({shape[1]} x {shape[0]}, {objects} object{plural}){beside}."
-        f" Next: brrp reconstruct {output}"
+        f" Next: brrp reconstruct {quote(str(output))}"
     )

@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 from dataclasses import replace
 from pathlib import Path
+from shlex import quote
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -213,8 +214,8 @@ def make_masks(
     how = f"the prompt {source.prompt!r}" if source.prompt else "what stands on the table"
     note(f"Masks: made on the way from {how}, {len(frame.object_ids)} objects: {picture}")
     note(
-        f"  to correct them: brrp segment {output / 'frame.npz'} --merge 1,2 --split 3 --drop 4"
-        " -o NEW.npz"
+        f"  to correct them: brrp segment {quote(str(output / 'frame.npz'))} --merge 1,2 --split 3"
+        " --drop 4 -o NEW.npz"
     )
     return frame
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import platform
+import shlex
 import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
@@ -138,7 +139,7 @@ def evaluate(request: Request, say: Callable[[str], None] = lambda text: None) -
             **parameters,
             "prior": prior,
             "trained": {name: training[path] for name, path in weights.items()},
-            "command": " ".join(["brrp", *sys.argv[1:]]),
+            "command": shlex.join(["brrp", *sys.argv[1:]]),
             "machine": machine(),
             "bootstrap_rounds": ROUNDS,
             "same": {
