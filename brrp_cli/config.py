@@ -217,7 +217,7 @@ class MeanConfig:
     """
 
     nodes: int = 200_000
-    width: float = 0.001
+    width: float = 0.0005
     sure: float = 0.9
     doubt: float = 0.01
     limit: float = 5.0

@@ -34,7 +34,7 @@ class SeenObject:
     """One object of a frame.
 
     colours : (k, 3) RGB 0 to 255 and shares : (k,); None where the frame has no colours
-    pairs : (PAIR_BINS,), see appearance/pairs.py; None where there are too few points
+    pairs : (PAIR_BINS,), see descriptors/point_pairs.py; None where there are too few points
     size : (3,) metres, height above the plane and footprint; None without plane or points
     hidden : share of the outline that ends at something in front of it or at the image's edge
     """
