@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import click
 
 from brrp_cli.commands.method_options import OneOf
+from brrp_cli.commands.seed_option import SEED
 from brrp_cli.methods.registry import DEFAULT, METHODS
 from brrp_cli.progress import note
 
@@ -34,7 +35,9 @@ NOT_STORED = "none of them"
     default=Path("brrp_demo"),
     show_default=True,
 )
-@click.option("--seed", type=int, default=0, show_default=True, help="Another seed, another scene.")
+@click.option(
+    "--seed", type=SEED, default=0, show_default=True, help="Another seed, another scene."
+)
 @click.option(
     "--preset",
     "preset_name",

@@ -11,6 +11,7 @@ import click
 
 from brrp_cli.commands.method_options import OneOf, check_weights, methods_help, weights_help
 from brrp_cli.commands.retriever_option import RetrieverName
+from brrp_cli.commands.seed_option import SEED
 from brrp_cli.methods.registry import COMPARED, METHODS, preset_names
 from brrp_cli.progress import note
 from brrp_cli.retrieval.choose import RETRIEVERS
@@ -105,7 +106,7 @@ def _selection(ctx: click.Context, option: click.Parameter, value: str | None) -
 @click.option("--scenes", "selection", metavar="A:B", callback=_selection, help="Only these.")
 @click.option("--workers", type=click.IntRange(1), help="Processes of one thread. [default: cores]")
 @click.option("--pictures", is_flag=True, help="Write a picture of each scene and variant.")
-@click.option("--seed", type=int, default=0, show_default=True)
+@click.option("--seed", type=SEED, default=0, show_default=True)
 @click.option("--device", type=click.Choice(["auto", "cpu", "cuda"]), default="auto")
 @click.option("--overwrite", is_flag=True, help="Start anew where another run's rows are.")
 def command(

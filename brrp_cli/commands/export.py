@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from brrp_cli.commands.seed_option import SEED
 from brrp_cli.planning.options import DENSITY, PlanOptions
 from brrp_cli.planning.parts import COACD, HOW, check_available
 from brrp_cli.progress import note
@@ -50,7 +51,7 @@ CONFIDENCE = click.FloatRange(0.5, 0.999)
     show_default=True,
     help="kg / m^3 of solid objects, for mass and inertia.",
 )
-@click.option("--seed", type=int, default=0, show_default=True)
+@click.option("--seed", type=SEED, default=0, show_default=True)
 @click.option("--overwrite", is_flag=True, help="Replace the output folder if it is there.")
 def command(
     results: Path,

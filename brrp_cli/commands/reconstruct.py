@@ -20,6 +20,7 @@ from brrp_cli.commands.method_options import (
     weights_help,
 )
 from brrp_cli.commands.retriever_option import RetrieverName
+from brrp_cli.commands.seed_option import SEED
 from brrp_cli.commands.source_options import SourceOptions, source_options
 from brrp_cli.commands.view import PAGE, title, view
 from brrp_cli.files import atomic_path
@@ -80,7 +81,7 @@ NO_COLLISION = "none"
     help=f"Folder with CLIP ViT-B/16 as ONNX. [default: {CLIP_DIR_VARIABLE}, else the fetched]",
 )
 @click.option("--frame", "coordinates", type=click.Choice(["camera", "world"]), default="camera")
-@click.option("--seed", type=int, default=0, show_default=True)
+@click.option("--seed", type=SEED, default=0, show_default=True)
 @click.option("--device", type=click.Choice(["auto", "cpu", "cuda"]), default="auto")
 @click.option("--workers", type=click.IntRange(1), help="Objects at a time. [default: cores]")
 @click.option(
@@ -162,6 +163,8 @@ def command(
     config = chosen.preset(preset_name)
     config = replace(config, k=k) if k else config
     prior, retrieval = open_prior_of(chosen, prior_path, config, retriever, clip_dir, seed)
+    if prior is not None and k is not None and k > len(prior.names):
+        note(f"--k {k}: the prior holds {len(prior.names)} objects, all of them are taken")
     if prior is None:
         trained = "" if weights is None else f", weights {weights}"
         note(f"Method: {method}, without a prior{trained}")

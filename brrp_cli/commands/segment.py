@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import click
 
 from brrp_cli.commands.frame import refuse_existing, tell
+from brrp_cli.commands.seed_option import SEED
 from brrp_cli.commands.source_options import SourceOptions, source_options
 
 if TYPE_CHECKING:
@@ -47,7 +48,7 @@ def _splits(
     "--merge", "merges", multiple=True, callback=_ids, metavar="ID,ID", help="Make them one."
 )
 @click.option("--drop", "drops", multiple=True, callback=_ids, metavar="ID", help="Forget them.")
-@click.option("--seed", default=0, show_default=True)
+@click.option("--seed", type=SEED, default=0, show_default=True)
 @click.option("-o", "--output", type=click.Path(path_type=Path), required=True, help="FRAME.npz")
 @click.option("--overwrite", is_flag=True, help="Replace what stands at the output.")
 def command(

@@ -24,7 +24,6 @@ from brrp_cli.segmentation.region_growing import fill_holes, grow
 from brrp_cli.segmentation.smooth_depth import flying_pixels, smooth_depth
 from brrp_cli.segmentation.table_plane import find_table
 
-
 # Of the image, that must have depth which agrees with its neighbours'.
 MIN_SHARE = 0.01
 
@@ -141,7 +140,8 @@ def _numbered(segmap: NDArray[np.int64], frame: Frame, min_area: float) -> NDArr
             where=frame.source,
             expected="objects that rise above their support plane",
             found=f"none that shows {min_area * 1e4:g} cm^2 of itself",
-            fix="move the camera nearer, or pass masks with --masks",
+            fix="check the unit of depth (--depth-scale), move the camera nearer, or pass masks"
+            " with --masks",
         )
     numbered = np.zeros_like(segmap)
     for number, old in enumerate(sorted(middles, key=lambda i: middles[i]), start=1):

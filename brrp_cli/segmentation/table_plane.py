@@ -76,7 +76,8 @@ def find_table(points: NDArray[np.floating], seed: int, source: object = None) -
             where=source,
             expected="a table that fills a good part of the image",
             found="no plane with a twentieth of the points",
-            fix="take the picture so that more of the table is seen, or pass masks with --masks",
+            fix="check the unit of depth (--depth-scale), take the picture so that more of the"
+            " table is seen, or pass masks with --masks",
         )
     plane = _above_the_floor(planes)
     axes = np.linalg.svd(plane.normal[None])[2][1:]
