@@ -19,6 +19,9 @@ from brrp_cli.errors import BrrpError, unexpected
 
 # Seconds that a worker which is to stop may take to end by itself.
 PATIENCE = 1.0
+# Seconds without a task at work after which it is asked whether processes start at all, and what
+# one that does nothing may take.
+_START, _PROBE = 10.0, 60.0
 _ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
 
@@ -29,8 +32,19 @@ def run_tasks(
 
     function : importable by name; called with each task's values in a process with one thread.
     time_limit : seconds for one task. No more than `workers` tasks are out at a time, so that
-    results that nobody has taken yet do not pile up.
+    results that nobody has taken yet do not pile up. Errors: BrrpError where no process starts.
     """
+    try:
+        yield from _results(function, tasks, workers, time_limit)
+    except OSError as error:
+        # The system's own words for no more processes, or for no semaphores. A BrokenPipeError,
+        # of a helper of multiprocessing that died, would end a command without a word.
+        raise cannot_start(error) from error
+
+
+def _results(
+    function: Callable[..., Any], tasks: Sequence[tuple[Any, ...]], workers: int, time_limit: float
+) -> Generator[tuple[int, Any], None, None]:
     import pebble
 
     pebble.CONSTS.term_timeout = PATIENCE
@@ -48,10 +62,45 @@ def run_tasks(
                     index, task = todo.pop()
                     future = pool.schedule(_call, (function, task), timeout=time_limit)
                     running[future] = index
-                for future in wait(running, return_when=FIRST_COMPLETED).done:
+                ended = wait(running, timeout=_START, return_when=FIRST_COMPLETED).done
+                broken = any(isinstance(future.exception(), BrokenProcessPool) for future in ended)
+                if broken or not (ended or any(future.running() for future in running)):
+                    require_processes()
+                for future in ended:
                     yield running.pop(future), _result(future, time_limit)
         finally:
             _stop(pool)
+
+
+def require_processes() -> None:
+    """BrrpError unless a process that does nothing starts and ends well."""
+    process = multiprocessing.get_context("spawn").Process(target=_nothing)
+    try:
+        process.start()
+    except OSError as error:
+        raise cannot_start(error) from error
+    process.join(_PROBE)
+    if process.exitcode is None:
+        process.kill()
+        process.join()
+        raise cannot_start(f"one that does nothing did not end in {_PROBE:g} s")
+    if process.exitcode != 0:
+        raise cannot_start(f"one that does nothing ended with exit code {process.exitcode}")
+
+
+def _nothing() -> None:
+    """What a process does that is only there to see whether it starts."""
+
+
+def cannot_start(found: object) -> BrrpError:
+    """The message where worker processes do not start."""
+    return BrrpError(
+        "Worker processes cannot start",
+        expected="processes beside this one, and semaphores for them in /dev/shm",
+        found=found,
+        fix="lift the limit on processes (ulimit -u) or what the container forbids; a script of"
+        ' your own must start its work below `if __name__ == "__main__":`',
+    )
 
 
 def _pool(workers: int) -> Any:

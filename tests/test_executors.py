@@ -1,10 +1,15 @@
+import errno
 import multiprocessing
+import multiprocessing.synchronize
 import os
 import signal
 import time
 from multiprocessing.util import Finalize
 from pathlib import Path
 
+import pytest
+
+from brrp_cli import executors
 from brrp_cli.errors import BrrpError, MeshError
 from brrp_cli.executors import run_tasks
 
@@ -65,3 +70,26 @@ def test_a_worker_that_is_killed_while_it_has_nothing_to_do_costs_no_task() -> N
         child.join()
     time.sleep(0.5)
     assert list(results) == [(1, "B"), (2, "C")]
+
+
+@pytest.mark.parametrize("program", ["/bin/false", "/no/such/python"])
+def test_processes_that_do_not_start_are_told(program, monkeypatch) -> None:
+    monkeypatch.setattr(executors, "_START", 1.0)
+    before = multiprocessing.spawn.get_executable()
+    multiprocessing.set_executable(program)
+    try:
+        with pytest.raises(BrrpError, match="Worker processes cannot start") as told:
+            list(run_tasks(act, [("a",), ("b",)], workers=2, time_limit=60.0))
+    finally:
+        multiprocessing.set_executable(before)
+    assert "exit code" in str(told.value.found)
+    assert not multiprocessing.active_children()
+
+
+def test_a_machine_without_semaphores_is_told(monkeypatch) -> None:
+    def refuse(*arguments: object) -> None:
+        raise OSError(errno.ENOSYS, os.strerror(errno.ENOSYS))
+
+    monkeypatch.setattr(multiprocessing.synchronize._multiprocessing, "SemLock", refuse)
+    with pytest.raises(BrrpError, match="Worker processes cannot start"):
+        list(run_tasks(act, [("a",)], workers=1, time_limit=60.0))

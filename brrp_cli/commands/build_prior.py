@@ -7,6 +7,7 @@ from pathlib import Path
 
 import click
 
+from brrp_cli.commands.seed_option import SEED
 from brrp_cli.errors import BrrpError
 from brrp_cli.prior.locate import output_prior
 from brrp_cli.prior.parameters import UNITS, BuildParameters
@@ -30,7 +31,7 @@ from brrp_cli.retrieval.clip.model_files import clip_folder
     show_default=True,
     help="Labelled samples for each object.",
 )
-@click.option("--seed", type=int, default=0, show_default=True)
+@click.option("--seed", type=SEED, default=0, show_default=True)
 @click.option(
     "--workers", type=click.IntRange(1), help="Processes; as many as processors if not said."
 )

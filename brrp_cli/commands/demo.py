@@ -10,7 +10,10 @@ from typing import TYPE_CHECKING
 
 import click
 
+from brrp_cli.commands.json_option import json_option, report_of
 from brrp_cli.commands.method_options import OneOf
+from brrp_cli.commands.object_table import told
+from brrp_cli.commands.seed_option import SEED
 from brrp_cli.methods.registry import DEFAULT, METHODS
 from brrp_cli.progress import note
 
@@ -34,7 +37,9 @@ NOT_STORED = "none of them"
     default=Path("brrp_demo"),
     show_default=True,
 )
-@click.option("--seed", type=int, default=0, show_default=True, help="Another seed, another scene.")
+@click.option(
+    "--seed", type=SEED, default=0, show_default=True, help="Another seed, another scene."
+)
 @click.option(
     "--preset",
     "preset_name",
@@ -42,8 +47,16 @@ NOT_STORED = "none of them"
     help="[default: the first]",
 )
 @click.option("--device", type=click.Choice(["auto", "cpu", "cuda"]), default="auto")
+@json_option
 @click.option("--overwrite", is_flag=True, help="Replace the output folder if it is there.")
-def command(output: Path, seed: int, preset_name: str | None, device: str, overwrite: bool) -> None:
+def command(
+    output: Path,
+    seed: int,
+    preset_name: str | None,
+    device: str,
+    as_json: bool,
+    overwrite: bool,
+) -> None:
     """Run the whole path on a made scene and score it.
 
     Builds the starter prior from household shapes on first use, makes a tabletop frame of some of
@@ -87,12 +100,24 @@ def command(output: Path, seed: int, preset_name: str | None, device: str, overw
         for object_id, mesh in scene.truth.items():
             save_truth(mesh, partial / "truth" / f"object_{object_id}.ply")
         write_results(result, partial / "result")
-    report(result, scene, scores, set(prior.names))
-    click.echo(
-        f"Wrote {len(result.reconstructed)} of {len(result.objects)} objects, metres, camera frame,"
-        f" in {time.perf_counter() - start:.0f} s: {output}/ (frame.npz, truth/object_*.ply,"
-        " result/object_*.ply, result/scene.glb, result/preview.png)"
-    )
+    with report_of(as_json) as record:
+        report(result, scene, scores, set(prior.names))
+        click.echo(
+            f"Wrote {len(result.reconstructed)} of {len(result.objects)} objects, metres, camera"
+            f" frame, in {time.perf_counter() - start:.0f} s: {output}/ (frame.npz,"
+            " truth/object_*.ply, result/object_*.ply, result/scene.glb, result/preview.png)"
+        )
+        record["output"] = str(output)
+        record["objects"] = [
+            {
+                **each.record(),
+                "truth": scene.names[each.object_id],
+                "in_prior": scene.names[each.object_id] in prior.names,
+                "iou": scores[each.object_id].iou,
+                "chamfer_m": scores[each.object_id].chamfer,
+            }
+            for each in told(result)
+        ]
     if len(result.reconstructed) < len(result.objects):
         sys.exit(SOME_FAILED)
 

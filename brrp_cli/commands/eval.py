@@ -9,6 +9,7 @@ from typing import Any
 
 import click
 
+from brrp_cli.commands.json_option import json_option, report_of
 from brrp_cli.commands.method_options import (
     CONFIG_HELP,
     OneOf,
@@ -17,6 +18,7 @@ from brrp_cli.commands.method_options import (
     weights_help,
 )
 from brrp_cli.commands.retriever_option import RetrieverName
+from brrp_cli.commands.seed_option import SEED
 from brrp_cli.methods.registry import COMPARED, METHODS, preset_names
 from brrp_cli.progress import note
 from brrp_cli.retrieval.choose import RETRIEVERS
@@ -118,8 +120,9 @@ def _selection(ctx: click.Context, option: click.Parameter, value: str | None) -
 @click.option("--scenes", "selection", metavar="A:B", callback=_selection, help="Only these.")
 @click.option("--workers", type=click.IntRange(1), help="Processes of one thread. [default: cores]")
 @click.option("--pictures", is_flag=True, help="Write a picture of each scene and variant.")
-@click.option("--seed", type=int, default=0, show_default=True)
+@click.option("--seed", type=SEED, default=0, show_default=True)
 @click.option("--device", type=click.Choice(["auto", "cpu", "cuda"]), default="auto")
+@json_option
 @click.option("--overwrite", is_flag=True, help="Start anew where another run's rows are.")
 def command(
     scenes: Path,
@@ -140,6 +143,7 @@ def command(
     pictures: bool,
     seed: int,
     device: str,
+    as_json: bool,
     overwrite: bool,
 ) -> None:
     """Measure methods on scenes whose truth is known.
@@ -158,6 +162,7 @@ def command(
     Exit codes: 0 all objects have a result, 3 some failed.
     """
     from brrp_cli.evaluation.request import Request, evaluate
+    from brrp_cli.evaluation.summary import as_record
 
     check_weights(methods, weights)
     request = Request(
@@ -182,18 +187,22 @@ def command(
         overwrite=overwrite,
     )
     result = evaluate(request, say=note)
-    for summary in result.summaries:
-        distance, f_score = summary.figures["surface_distance"], summary.figures["f_score_5mm"]
-        figures = f"distance {distance.value * 1000:.2f} mm  F(5 mm) {f_score.value:.3f}"
-        iou = summary.figures["iou"]
-        figures += f"  IoU as published {iou.value:.3f}"
-        if not METHODS[summary.variant.method].gives_shapes:
-            first, in_3 = summary.figures["true_first"], summary.figures["true_in_3"]
-            figures = f"true object first {first.value:.3f}, among 3 {in_3.value:.3f}"
-        click.echo(
-            f"  {result.labels[summary.variant]:<24} {figures}  {summary.objects} objects, "
-            f"{summary.failed} failed, {summary.empty} empty"
-        )
-    click.echo(f"Wrote {request.output}/ ({', '.join(result.files)})")
+    with report_of(as_json) as report:
+        for summary in result.summaries:
+            distance, f_score = summary.figures["surface_distance"], summary.figures["f_score_5mm"]
+            figures = f"distance {distance.value * 1000:.2f} mm  F(5 mm) {f_score.value:.3f}"
+            iou = summary.figures["iou"]
+            figures += f"  IoU as published {iou.value:.3f}"
+            if not METHODS[summary.variant.method].gives_shapes:
+                first, in_3 = summary.figures["true_first"], summary.figures["true_in_3"]
+                figures = f"true object first {first.value:.3f}, among 3 {in_3.value:.3f}"
+            click.echo(
+                f"  {result.labels[summary.variant]:<24} {figures}  {summary.objects} objects, "
+                f"{summary.failed} failed, {summary.empty} empty"
+            )
+        click.echo(f"Wrote {request.output}/ ({', '.join(result.files)})")
+        report["output"] = str(request.output)
+        report["lost"] = result.lost
+        report["results"] = {result.labels[s.variant]: as_record(s) for s in result.summaries}
     if result.lost or any(summary.failed for summary in result.summaries):
         sys.exit(SOME_FAILED)

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from brrp_cli.commands.seed_option import SEED
 from brrp_cli.planning.options import DENSITY, PlanOptions
-from brrp_cli.planning.parts import COACD, HOW
+from brrp_cli.planning.parts import COACD, HOW, check_available
 from brrp_cli.progress import note
 
 if TYPE_CHECKING:
@@ -50,7 +51,7 @@ CONFIDENCE = click.FloatRange(0.5, 0.999)
     show_default=True,
     help="kg / m^3 of solid objects, for mass and inertia.",
 )
-@click.option("--seed", type=int, default=0, show_default=True)
+@click.option("--seed", type=SEED, default=0, show_default=True)
 @click.option("--overwrite", is_flag=True, help="Replace the output folder if it is there.")
 def command(
     results: Path,
@@ -77,6 +78,7 @@ def command(
 
     if margin and confidence is None:
         raise click.UsageError("--margin grows the shapes of --confidence, so give both")
+    check_available(collision)
     options = PlanOptions(collision, confidence, margin / 1000, density, seed)
     export(open_result(results), output, options, overwrite=overwrite)
 

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from pathlib import Path
+from shlex import quote
 
 import click
 
+from brrp_cli.commands.seed_option import SEED
 from brrp_cli.commands.source_options import SourceOptions, source_options
 from brrp_cli.errors import FrameError, OutputError
 
@@ -13,7 +15,7 @@ from brrp_cli.errors import FrameError, OutputError
 @click.command("frame")
 @source_options
 @click.option("--segment", is_flag=True, help="Find what stands on the table, without masks.")
-@click.option("--seed", default=0, show_default=True, help="Seed of the plane search.")
+@click.option("--seed", type=SEED, default=0, show_default=True, help="Seed of the plane search.")
 @click.option("-o", "--output", type=click.Path(path_type=Path), required=True, help="FRAME.npz")
 @click.option("--overwrite", is_flag=True, help="Replace what stands at the output.")
 def command(source: SourceOptions, segment: bool, seed: int, output: Path, overwrite: bool) -> None:
@@ -77,5 +79,5 @@ def tell(shape: tuple[int, int], objects: int, output: Path, picture: Path | Non
     plural = "" if objects == 1 else "s"
     click.echo(
         f"Wrote {output} ({shape[1]} x {shape[0]}, {objects} object{plural}){beside}."
-        f" Next: brrp reconstruct {output}"
+        f" Next: brrp reconstruct {quote(str(output))}"
     )

@@ -5,12 +5,14 @@ from __future__ import annotations
 import sys
 from dataclasses import asdict, replace
 from pathlib import Path
+from shlex import quote
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from brrp_cli.commands.export import CONFIDENCE, export
 from brrp_cli.commands.frame import refuse_existing
+from brrp_cli.commands.json_option import json_option, report_of
 from brrp_cli.commands.method_options import (
     CONFIG_HELP,
     OneOf,
@@ -19,7 +21,9 @@ from brrp_cli.commands.method_options import (
     methods_help,
     weights_help,
 )
+from brrp_cli.commands.object_table import lines, told
 from brrp_cli.commands.retriever_option import RetrieverName
+from brrp_cli.commands.seed_option import SEED
 from brrp_cli.commands.source_options import SourceOptions, source_options
 from brrp_cli.commands.view import PAGE, title, view
 from brrp_cli.files import atomic_path
@@ -35,13 +39,10 @@ if TYPE_CHECKING:
     from brrp_cli.frames.frame import Frame
     from brrp_cli.methods.base import Method
     from brrp_cli.prior.store import Prior
-    from brrp_cli.reconstruction import ObjectReconstruction, Reconstruction
     from brrp_cli.retrieval.base import Retriever
 
 SOME_FAILED = 3
 POSES = "poses_bop.csv"
-# A size that differs by less is told as the object's own.
-OWN_SIZE = 0.005
 NO_COLLISION = "none"
 
 
@@ -82,7 +83,7 @@ NO_COLLISION = "none"
     help=f"Folder with CLIP ViT-B/16 as ONNX. [default: {CLIP_DIR_VARIABLE}, else the fetched]",
 )
 @click.option("--frame", "coordinates", type=click.Choice(["camera", "world"]), default="camera")
-@click.option("--seed", type=int, default=0, show_default=True)
+@click.option("--seed", type=SEED, default=0, show_default=True)
 @click.option("--device", type=click.Choice(["auto", "cpu", "cuda"]), default="auto")
 @click.option("--workers", type=click.IntRange(1), help="Objects at a time. [default: cores]")
 @click.option(
@@ -104,6 +105,7 @@ NO_COLLISION = "none"
 )
 @click.option("--html", is_flag=True, help=f"Also what `brrp view` writes, OUT/{PAGE}.")
 @click.option("--view", "open_it", is_flag=True, help="The same, and open it in a browser.")
+@json_option
 @click.option("--overwrite", is_flag=True, help="Replace the output folder if it is there.")
 def command(
     source: SourceOptions,
@@ -125,6 +127,7 @@ def command(
     poses: str | None,
     html: bool,
     open_it: bool,
+    as_json: bool,
     overwrite: bool,
 ) -> None:
     """Turn an RGBD frame into a closed mesh for every object.
@@ -170,6 +173,8 @@ def command(
         masks = SegmentConfig() if read is None else read.segmentation()
         frame = make_masks(source, frame, output, seed, masks, overwrite=overwrite)
     prior, retrieval = open_prior_of(chosen, prior_path, config, retriever, clip_dir, seed)
+    if prior is not None and k is not None and k > len(prior.names):
+        note(f"--k {k}: the prior holds {len(prior.names)} objects, all of them are taken")
     if prior is None:
         trained = "" if weights is None else f", weights {weights}"
         note(f"Method: {method}, without a prior{trained}")
@@ -187,23 +192,29 @@ def command(
     if masks is not None:
         result = replace(result, segmentation=asdict(masks))
     write_results(result, output, frame=coordinates, overwrite=overwrite)
-    report(result)
+    table = told(result)
     done = len(result.reconstructed)
     recognised = sum(item.recognised is not None for item in result.objects)
-    meshes = "object_*.ply, scene.glb, " if done else "no mesh: result.json says why; "
-    click.echo(
-        f"Wrote {done} of {len(result.objects)} objects, metres, {coordinates} frame: {output}/ "
-        f"({meshes}posterior.h5, result.json, preview.png)"
-    )
-    if poses is not None:
-        with atomic_path(output / POSES) as path:
-            path.write_text(bop_csv(result, [] if prior is None else prior.names))
-        click.echo(f"Wrote the poses of {recognised} recognised objects: {output / POSES}")
-    if done and collision != NO_COLLISION:
-        options = PlanOptions(collision, confidence, seed=seed)
-        export(open_result(output), None, options, overwrite=False)
-    if html or open_it:
-        view(open_result(output), title(output), output / PAGE, open_it=open_it)
+    with report_of(as_json) as report:
+        for line in lines(table):
+            click.echo(line)
+        meshes = "object_*.ply, scene.glb, " if done else "no mesh: result.json says why; "
+        click.echo(
+            f"Wrote {done} of {len(result.objects)} objects, metres, {coordinates} frame:"
+            f" {output}/ ({meshes}posterior.h5, result.json, preview.png)"
+        )
+        if poses is not None:
+            with atomic_path(output / POSES) as path:
+                path.write_text(bop_csv(result, [] if prior is None else prior.names))
+            click.echo(f"Wrote the poses of {recognised} recognised objects: {output / POSES}")
+        if done and collision != NO_COLLISION:
+            options = PlanOptions(collision, confidence, seed=seed)
+            export(open_result(output), None, options, overwrite=False)
+        if html or open_it:
+            view(open_result(output), title(output), output / PAGE, open_it=open_it)
+        report["output"] = str(output)
+        report["frame"] = coordinates
+        report["objects"] = [each.record() for each in table]
     if done < len(result.objects):
         sys.exit(SOME_FAILED)
 
@@ -230,8 +241,8 @@ def make_masks(
     how = f"the prompt {source.prompt!r}" if source.prompt else "what stands on the table"
     note(f"Masks: made on the way from {how}, {len(frame.object_ids)} objects: {picture}")
     note(
-        f"  to correct them: brrp segment {output / 'frame.npz'} --merge 1,2 --split 3 --drop 4"
-        " -o NEW.npz"
+        f"  to correct them: brrp segment {quote(str(output / 'frame.npz'))} --merge 1,2 --split 3"
+        " --drop 4 -o NEW.npz"
     )
     return frame
 
@@ -266,27 +277,3 @@ def open_prior_of(
     chosen = choose_retriever(retriever, prior, config, seed, clip_dir=clip_dir)
     note(f"Retrieval: {chosen.name}")
     return prior, chosen
-
-
-def report(result: Reconstruction) -> None:
-    """Print a line for each object."""
-    for item in result.objects:
-        match = outcome(item)
-        seconds = f"{sum(item.seconds.values()):.1f} s" if item.seconds else ""
-        text = "; ".join(part for part in (match, item.message, seconds) if part)
-        note(f"  object {item.object_id}: {item.status}  {text}")
-
-
-def outcome(item: ObjectReconstruction) -> str:
-    """What the object was taken for, with its weight; of the paper's preset, what was retrieved."""
-    found = item.recognised
-    if found is not None:
-        size = found.size_factor or 1.0
-        other = "" if abs(size - 1) < OWN_SIZE else f", {size:.2f} of its size"
-        return f"{found.name} (weight {found.weight:.2f}{other})"
-    best = item.retrieved[0] if item.retrieved else None
-    if best is None:
-        return ""
-    if item.unknown_weight is not None:
-        return f"not in the prior (weight {item.unknown_weight:.2f}; most like {best.name})"
-    return f"{best.name} (retrieved with {best.probability:.2f})"

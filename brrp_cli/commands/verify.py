@@ -7,12 +7,14 @@ from pathlib import Path
 
 import click
 
+from brrp_cli.commands.json_option import json_option, report_of
 from brrp_cli.prior.default import locate_prior
 
 
 @click.command("verify")
 @click.argument("prior", type=click.Path(path_type=Path), required=False)
-def command(prior: Path | None) -> None:
+@json_option
+def command(prior: Path | None, as_json: bool) -> None:
     """Check every checksum, shape and type in PRIOR, and list all problems.
 
     Without PRIOR: BRRP_PRIOR, else the user's data folder, else the starter prior.
@@ -28,11 +30,16 @@ def command(prior: Path | None) -> None:
     folder, how = locate_prior(prior)
     opened = open_prior(folder)
     problems = verify_prior(opened)
-    for problem in problems:
-        click.echo(problem)
     counts = f"{len(opened.names)} objects in {len(opened.manifest.shards)} shards"
+    with report_of(as_json) as report:
+        for problem in problems:
+            click.echo(problem)
+        found = f"{len(problems)} problems" if problems else "all is well"
+        click.echo(f"{folder} ({how}): {counts}, {found}")
+        report["path"] = str(folder)
+        report["objects"] = len(opened.names)
+        report["shards"] = len(opened.manifest.shards)
+        report["problems"] = problems
     if problems:
-        click.echo(f"{folder} ({how}): {counts}, {len(problems)} problems")
         click.echo("fix: run brrp build-prior again on the same meshes", err=True)
         sys.exit(1)
-    click.echo(f"{folder} ({how}): {counts}, all is well")

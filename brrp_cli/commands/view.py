@@ -31,12 +31,16 @@ PAGE = "view.html"
     is_flag=True,
     help="Show in Rerun instead (pip install rerun-sdk); -o FILE.rrd writes.",
 )
-def command(results: Path, output: Path | None, open_it: bool, rerun: bool) -> None:
+@click.option("--overwrite", is_flag=True, help="Replace the file that -o names.")
+def command(
+    results: Path, output: Path | None, open_it: bool, rerun: bool, overwrite: bool
+) -> None:
     """Write and open one HTML page that shows the results in OUT/.
 
     The page holds all that it needs, so that it can be kept, sent and opened without a network:
     the image, the observed points, every object to turn on and off, uncertainty as colour, what
     was retrieved and how sure that is, and the collision shapes where `brrp export` wrote some.
+    OUT/view.html is made anew each time; a file that -o names is replaced only with --overwrite.
 
     \b
     Example:
@@ -45,7 +49,10 @@ def command(results: Path, output: Path | None, open_it: bool, rerun: bool) -> N
       brrp view out/ --rerun
     """
     from brrp_cli.api import open_result
+    from brrp_cli.files import refuse_existing
 
+    if output is not None:
+        refuse_existing(output, overwrite=overwrite)
     stored = open_result(results)
     if rerun:
         from brrp_cli.view.rerun import show

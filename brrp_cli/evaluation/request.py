@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import platform
+import shlex
 import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
@@ -14,6 +15,7 @@ from typing import Any
 from brrp_cli.errors import WeightsError
 from brrp_cli.evaluation.bootstrap import ROUNDS
 from brrp_cli.evaluation.folder import PARAMETERS, ROWS, claimed
+from brrp_cli.evaluation.match_names import match_names
 from brrp_cli.evaluation.report import write_report
 from brrp_cli.evaluation.rows import METRICS, Row, RowLog, table
 from brrp_cli.evaluation.run import collect, remaining, run_remaining
@@ -100,12 +102,23 @@ def evaluate(request: Request, say: Callable[[str], None] = lambda text: None) -
     if any(variant.retriever in USE_CLIP for variant in variants):
         _prepare_clip(opened, need_clip_folder(request.clip_dir))
     parameters = _parameters(request, scenes, variants, prior)
+    data_root = request.data_root or find_data_root(scenes, request.scenes)
+    if opened is not None:
+        scenes, matched = match_names(scenes, data_root, opened.manifest.objects)
+        if not matched:
+            say(
+                f"None of the true objects is in the prior {opened.path}, by content or by name:"
+                " what the tables say of retrieval and recognition is of strangers alone"
+            )
+    for variant in variants:
+        if opened is not None and variant.k is not None and variant.k > len(opened.names):
+            say(f"--k {variant.k}: the prior holds {len(opened.names)} objects, all are taken")
     workers = request.workers or cores()
     labels = short_labels(variants)
     plan = Plan(
         scenes=scenes,
         variants=variants,
-        data_root=request.data_root or find_data_root(scenes, request.scenes),
+        data_root=data_root,
         cache=truth_cache(),
         prior=None if prior is None else Path(prior["path"]),
         clip_dir=request.clip_dir,
@@ -141,7 +154,7 @@ def evaluate(request: Request, say: Callable[[str], None] = lambda text: None) -
             **parameters,
             "prior": prior,
             "trained": {name: training[path] for name, path in weights.items()},
-            "command": " ".join(["brrp", *sys.argv[1:]]),
+            "command": shlex.join(["brrp", *sys.argv[1:]]),
             "machine": machine(),
             "bootstrap_rounds": ROUNDS,
             "same": {

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +20,8 @@ log = logging.getLogger(__name__)
 MAX_PIXELS = 2**24
 FARTHEST_MEDIAN = 20.0  # metres; nobody reconstructs a table from further away
 NEAREST_MEDIAN = 0.01
+# Cameras measure from about 0.1 m, and tables stand within a few: beyond, the unit is suspect.
+USUAL_MEDIAN = 0.15, 4.0
 FARTHEST = 100.0  # metres; single values beyond it are a sensor's or a format's, not a place
 MAX_OBJECTS = 1000
 _GREY = 128
@@ -34,6 +37,7 @@ def make_frame(
     T_world_cam: ArrayLike | None = None,
     depth_scale: float | None = None,
     source: Path | None = None,
+    files: Mapping[str, Path] | None = None,
 ) -> Frame:
     """Check one camera's arrays and make a frame of them. The arrays are copied, never changed.
 
@@ -49,17 +53,19 @@ def make_frame(
     T_world_cam : (4, 4) rigid transform, camera frame to world frame
     depth_scale : raw value x depth_scale = metres
     source : file or folder, for messages
+    files : the file of single arrays, for messages, where they have one each: array's name -> path
 
     Errors: FrameError, which names the array, what was expected and what was found.
     """
+    where = {name: (files or {}).get(name, source) for name in ("rgb", "segmap", "depth", "K")}
     if depth is not None:
         if K is None:
             raise FrameError(
                 "Depth without intrinsics", where=source, expected="K, (3, 3)", found="no K"
             )
-        z = _depth_metres(np.asarray(depth), depth_scale, source)
+        z = _depth_metres(np.asarray(depth), depth_scale, where["depth"])
         height, width = z.shape
-        K_checked = check_intrinsics(np.asarray(K), (height, width), source)
+        K_checked = check_intrinsics(np.asarray(K), (height, width), where["K"])
         points = backproject(z, K_checked)
     elif xyz is not None:
         points = _points_metres(np.asarray(xyz), depth_scale, source)
@@ -72,10 +78,12 @@ def make_frame(
         )
     if rgb is None:
         log.info("%s has no colour: grey stands in for it", source or "The frame")
+    shape = height, width
+    grey, nowhere = np.full((*shape, 3), _GREY, np.uint8), np.zeros(shape, np.int64)
     return Frame(
-        rgb=np.full((height, width, 3), _GREY, np.uint8) if rgb is None else _colour(rgb, source),
+        rgb=grey if rgb is None else _colour(rgb, where["rgb"]),
         points=points,
-        segmap=np.zeros((height, width), np.int64) if segmap is None else _masks(segmap, source),
+        segmap=nowhere if segmap is None else _masks(segmap, where["segmap"]),
         K=K_checked,
         T_world_cam=None if T_world_cam is None else check_pose(np.asarray(T_world_cam), source),
         source=source,
@@ -170,15 +178,28 @@ def _scaled(
     integers = raw.dtype.kind in "iu"
     factor = scale if scale is not None else (0.001 if integers else 1.0)
     median = float(np.median(raw_z[valid])) * factor
+    unit = "as millimetres" if integers else "as metres"
+    if scale is not None:
+        unit = "x depth scale"
     if not NEAREST_MEDIAN <= median <= FARTHEST_MEDIAN:
-        unit = "x depth scale" if scale is not None else ("as millimetres" if integers else "raw")
         raise FrameError(
-            f"{name} is not in metres",
+            f"{name} seems to be in another unit",
             where=source,
             expected=f"a median depth of {NEAREST_MEDIAN} to {FARTHEST_MEDIAN:g} m",
             found=f"median {median:.6g} m ({raw.dtype}, {unit})",
             fix="say what one unit is: --depth-scale 0.001 (Python: depth_scale=0.001) for"
             " millimetres, 0.0002 for TUM's 5000 to the metre",
+        )
+    if not USUAL_MEDIAN[0] <= median <= USUAL_MEDIAN[1]:
+        log.warning(
+            "%s: the median depth is %.3g m (%s, %s), which is unusual for a table: suspect the"
+            " unit, and say what one unit of depth is with --depth-scale",
+            source or "The frame",
+            median,
+            raw.dtype,
+            "x depth scale"
+            if scale is not None
+            else ("as millimetres" if integers else "as metres"),
         )
     with np.errstate(over="ignore", invalid="ignore"):
         metres = (raw.astype(np.float64) * factor).astype(np.float32)

@@ -19,6 +19,9 @@ MAX_RESIDUAL = 2.0
 _MAX_SHARE = 0.02
 # Focal lengths, as shares of the image's size, of a fish-eye and of a telescope.
 _FOCAL = 0.05, 1000.0
+# A principal point that lies beyond the middle by one factor in both directions, this large and
+# with this tolerance, is that of a larger image, of which this one is a smaller copy.
+_LARGER, _ALIKE = 1.4, 0.05
 _EXPECTED_K = "[[fx, 0, cx], [0, fy, cy], [0, 0, 1]], pixels, fx and fy > 0"
 
 
@@ -49,6 +52,18 @@ def check_intrinsics(
         raise refuse("K is not in pixels", "multiply normalised intrinsics by the image's size")
     if max(focal) > _FOCAL[1] or max(abs(K[0, 2]) / width, abs(K[1, 2]) / height) > _FOCAL[1]:
         raise refuse("K is of no camera that sees this image")
+    beyond = K[0, 2] / (width / 2), K[1, 2] / (height / 2)
+    if min(beyond) > _LARGER and abs(beyond[0] / beyond[1] - 1) < _ALIKE:
+        factor = sum(beyond) / 2
+        raise FrameError(
+            "The intrinsics are of a larger image",
+            where=source,
+            expected=f"a principal point near the middle of {width} x {height} pixels",
+            found=f"({K[0, 2]:.1f}, {K[1, 2]:.1f}), the middle of about "
+            f"{2 * K[0, 2]:.0f} x {2 * K[1, 2]:.0f}",
+            fix=f"take the intrinsics of this resolution, or divide fx, fy, cx and cy by"
+            f" {factor:.3g}",
+        )
     if not (0 <= K[0, 2] <= width and 0 <= K[1, 2] <= height):
         log.warning(
             "The principal point (%.1f, %.1f) lies outside the %d x %d image: is K of another"
@@ -125,4 +140,5 @@ def fit_intrinsics(
             f" {max(residuals):.3g} pixels",
             fix="transform the points to the camera frame, or pass depth and K",
         )
-    return check_intrinsics(K, (height, width), source)
+    # A given K has been checked, and its warning is out.
+    return K if given is not None else check_intrinsics(K, (height, width), source)

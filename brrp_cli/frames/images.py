@@ -48,7 +48,15 @@ def read_images(
         _same_size(shape, camera.shape, intrinsics)
     if depth_scale is None and raw.dtype.kind in "iu":
         _millimetres(camera, intrinsics)
-    frame = make_frame(rgb, ids, depth=raw, K=camera.K, depth_scale=depth_scale, source=depth)
+    frame = make_frame(
+        rgb,
+        ids,
+        depth=raw,
+        K=camera.K,
+        depth_scale=depth_scale,
+        source=depth,
+        files={"rgb": color, "K": intrinsics} | ({} if masks is None else {"segmap": Path(masks)}),
+    )
     unit = "millimetres" if raw.dtype.kind in "iu" else "metres"
     log.info(
         "Depth: %s, taken as %s (median %.2f m); --depth-scale says otherwise",

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
 from io import BytesIO
 from pathlib import Path
 from typing import Any
@@ -25,17 +28,14 @@ def decode(source: Path | BytesIO, mode: str | None) -> tuple[NDArray[Any], str]
     """
     where = source if isinstance(source, Path) else None
     try:
-        with Image.open(source) as image:
+        with _own_limit(), Image.open(source) as image:
             if image.width * image.height > MAX_PIXELS:
-                raise FrameError(
-                    "The image is too large",
-                    where=where,
-                    expected=f"at most {MAX_PIXELS} pixels",
-                    found=f"{image.width} x {image.height}",
-                )
+                raise _too_large(where, f"{image.width} x {image.height}")
             return np.asarray(image.convert(mode) if mode else image), image.mode
     except FrameError:
         raise
+    except Image.DecompressionBombError as error:
+        raise _too_large(where, str(error).split(",")[0]) from error
     except Exception as error:
         # Pillow's readers raise whatever the damaged file made them stumble over.
         raise FrameError(
@@ -45,6 +45,24 @@ def decode(source: Path | BytesIO, mode: str | None) -> tuple[NDArray[Any], str]
             found=str(error) if where else "bytes that are no such image",
             fix="it is damaged, cut short or not what its name says: write or fetch it again",
         ) from error
+
+
+def _too_large(where: Path | None, found: str) -> FrameError:
+    return FrameError(
+        "The image is larger than the limit",
+        where=where,
+        expected=f"at most {MAX_PIXELS} pixels (4096 x 4096)",
+        found=found,
+        fix="scale the images down, depth by nearest neighbour, and the intrinsics with them",
+    )
+
+
+@contextmanager
+def _own_limit() -> Iterator[None]:
+    """Without Pillow's warning of a large image: what is too large here is an error anyway."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", Image.DecompressionBombWarning)
+        yield
 
 
 def _open(path: Path, mode: str | None) -> tuple[NDArray[Any], str]:

@@ -18,6 +18,9 @@ from brrp_cli.errors import SceneError
 from brrp_cli.files import is_file, parse_json
 from brrp_cli.geometry import similarity, transform_points
 
+# Folders in which the YCB archive keeps an object's meshes.
+_INNER = ("google_16k", "google_64k", "google_512k", "tsdf", "poisson", "clouds")
+
 
 @dataclass(frozen=True)
 class TrueObject:
@@ -27,20 +30,26 @@ class TrueObject:
     mesh_path : relative to the data root
     T_world_object : (4, 4) similarity, the mesh's coordinates to world metres
     unit : metres that one unit of the mesh file is
+    known_as : what the prior calls it, where that is known
     """
 
     id: int
     mesh_path: str
     T_world_object: NDArray[np.float64]
     unit: float = 1.0
+    known_as: str | None = None
 
     @property
     def name(self) -> str:
-        """NAME of NAME/google_16k/textured.obj (YCB's layout), else the file's name."""
+        """What the prior calls it; else NAME of NAME/google_16k/textured.obj (YCB's layout) and of
+        NAME/textured.obj, else the file's name."""
         path = Path(self.mesh_path)
-        if path.stem == "textured" and len(path.parts) >= 3:
-            return path.parts[-3]
-        return path.stem
+        if self.known_as is not None:
+            return self.known_as
+        if path.stem != "textured" or len(path.parts) < 2:
+            return path.stem
+        inner = path.parent.name in _INNER and len(path.parts) >= 3
+        return path.parts[-3] if inner else path.parts[-2]
 
 
 def read_objects(path: Path) -> list[TrueObject]:

@@ -75,6 +75,8 @@ def largest_plane(
     RANSAC (on `drawn_points` at most), then least squares on all inliers. None where fewer than
     `min_points` points are nearer than `tolerance`, metres.
     """
+    if len(points) < MIN_PLANE_POINTS:
+        return None
     drawn = points
     if len(points) > drawn_points:
         drawn = points[np.random.default_rng(seed).choice(len(points), drawn_points, False)]
@@ -85,7 +87,10 @@ def largest_plane(
         model, _ = cloud.segment_plane(
             tolerance, ransac_n=3, num_iterations=iterations, probability=1.0
         )
-    model = np.asarray(model) / np.linalg.norm(model[:3])
+    length = np.linalg.norm(model[:3])
+    if not length > 0:  # no three of the drawn points span a plane
+        return None
+    model = np.asarray(model) / length
     for _ in range(2):
         inliers = points[np.abs(points @ model[:3] + model[3]) < tolerance]
         if len(inliers) < min_points:

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brrp_cli.dependencies import import_library
+from brrp_cli.errors import DependencyError
 
 Array = NDArray[np.float64]
 
@@ -33,8 +34,13 @@ def convex_parts(vertices: Array, faces: NDArray[np.int64], how: str, seed: int)
 
 def check_available(how: str) -> None:
     """DependencyError now, not after the work, where `how` lacks its library."""
-    if how == COACD:
+    if how != COACD:
+        return
+    try:
         import_library("coacd")
+    except DependencyError as error:
+        fix = f"{error.fix}; or take --collision {HULL}, which needs no library"
+        raise DependencyError(error.what, found=error.found, fix=fix) from error
 
 
 def hull_corners(points: Array) -> Array:

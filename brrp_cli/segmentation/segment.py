@@ -23,6 +23,9 @@ from brrp_cli.segmentation.region_growing import fill_holes, grow
 from brrp_cli.segmentation.smooth_depth import flying_pixels, smooth_depth
 from brrp_cli.segmentation.table_plane import find_table
 
+# Of the image, that must have depth which agrees with its neighbours'.
+MIN_SHARE = 0.01
+
 
 def segment(frame: Frame, seed: int = 0, config: SegmentConfig | None = None) -> NDArray[np.int64]:
     """Masks (H, W) of the objects that stand on the table: 1, 2, ... from left to right.
@@ -39,6 +42,15 @@ def segment(frame: Frame, seed: int = 0, config: SegmentConfig | None = None) ->
     depth = smooth_depth(np.where(flying_pixels(raw, smoothing), np.nan, raw), smoothing)
     points = backproject(depth, frame.K).astype(np.float64)
     valid = np.isfinite(depth)
+    if valid.sum() < MIN_SHARE * valid.size:
+        raise FrameError(
+            "Too little depth to find objects in",
+            where=frame.source,
+            expected=f"depth that neighbours agree on, at {MIN_SHARE:.0%} of the pixels or more",
+            found=f"{int(frame.valid.sum())} of {valid.size} pixels have depth,"
+            f" {int(valid.sum())} of them agree with their neighbours",
+            fix="check the depth image and its unit; masks made elsewhere go in by --masks",
+        )
     table = find_table(points[valid], seed, frame.source, config.table)
     height = table.plane.signed_distance(points)
     plan = table.plan(points)
@@ -102,7 +114,8 @@ def _numbered(segmap: NDArray[np.int64], frame: Frame, min_area: float) -> NDArr
             where=frame.source,
             expected="objects that rise above their support plane",
             found=f"none that shows {min_area * 1e4:g} cm^2 of itself",
-            fix="move the camera nearer, or pass masks with --masks",
+            fix="check the unit of depth (--depth-scale), move the camera nearer, or pass masks"
+            " with --masks",
         )
     numbered = np.zeros_like(segmap)
     for number, old in enumerate(sorted(middles, key=lambda i: middles[i]), start=1):

@@ -73,7 +73,8 @@ def find_table(
             where=source,
             expected="a table that fills a good part of the image",
             found=f"no plane with {config.least:.0%} of the points",
-            fix="take the picture so that more of the table is seen, or pass masks with --masks",
+            fix="check the unit of depth (--depth-scale), take the picture so that more of the"
+            " table is seen, or pass masks with --masks",
         )
     plane = _above_the_floor(planes, config)
     axes = np.linalg.svd(plane.normal[None])[2][1:]

@@ -137,7 +137,7 @@ def test_a_failure_is_one_message(images):
     arguments = ["--depth", str(images / "d.npy"), "-o", str(images / "f.npz"), "--segment"]
     result = run(images, *arguments)
     assert result.exit_code == 1
-    assert result.output.startswith("Error: depth is not in metres")
+    assert result.output.startswith("Error: depth seems to be in another unit")
     assert "--depth-scale" in result.output
     assert "Traceback" not in result.output
     assert not list(images.glob("f*"))

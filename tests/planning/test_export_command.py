@@ -242,4 +242,5 @@ def test_without_coacd_it_says_what_to_install(results, tmp_path, monkeypatch):
     monkeypatch.setitem(__import__("sys").modules, "coacd", None)
     code, output = run(results, "-o", tmp_path / "plan")
     assert code == 1 and "pip install coacd" in output and "Traceback" not in output
+    assert "--collision hull" in output
     assert not (tmp_path / "plan").exists()

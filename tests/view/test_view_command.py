@@ -192,3 +192,14 @@ def test_without_rerun_it_says_what_to_install(results, monkeypatch):
     monkeypatch.setitem(__import__("sys").modules, "rerun", None)
     code, output = run(results, "--rerun")
     assert code == 1 and "rerun-sdk" in output and "Traceback" not in output
+
+
+def test_a_file_of_the_users_is_replaced_only_when_asked(results, tmp_path):
+    page = tmp_path / "thesis.html"
+    page.write_text("not yours")
+    code, output = run(results, "--no-open", "-o", page)
+    assert code == 1 and "--overwrite" in output and page.read_text() == "not yours"
+    code, output = run(results, "--no-open", "-o", page, "--overwrite")
+    assert code == 0 and "<html" in page.read_text()
+    # The page of the results' own folder is brrp's to make anew.
+    assert [run(results, "--no-open")[0] for _ in range(2)] == [0, 0]

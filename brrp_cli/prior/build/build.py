@@ -19,6 +19,7 @@ from brrp_cli.prior.build.find_meshes import MeshSource, find_meshes
 from brrp_cli.prior.build.lock import only_builder
 from brrp_cli.prior.build.make_object import make_object
 from brrp_cli.prior.build.mesh_files import input_sha256
+from brrp_cli.prior.build.output_folder import refuse_foreign
 from brrp_cli.prior.build.reuse import Finished, Reusable, reusable_objects
 from brrp_cli.prior.build.shard_plan import plan_shards, shard_file
 from brrp_cli.prior.index import read_index
@@ -71,8 +72,10 @@ def build_prior(
     The same meshes and parameters give the same bytes, however many workers run and however often
     the build was interrupted. Errors: MeshError when there are no meshes or all of them fail;
     PriorError when the prior there has other parameters (and not `overwrite`) or another build is
-    at work on it; StoppedError after Ctrl-C or SIGTERM, which keeps what is finished; OutputError.
+    at work on it; StoppedError after Ctrl-C or SIGTERM, which keeps what is finished; OutputError,
+    also for a folder of other files; BrrpError where worker processes do not start.
     """
+    refuse_foreign(out)
     table = (parameters or BuildParameters()).as_dict()
     sources = {source.name: source for source in find_meshes(meshes)}
     given = read_descriptions(descriptions) if descriptions else {}

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from dataclasses import dataclass
 from pathlib import Path
+from shlex import quote
 
 from brrp_cli.errors import RetrievalError
 
@@ -94,7 +95,7 @@ def find_clip_files(folder: Path) -> ClipFiles:
             where=folder,
             expected=_layouts(),
             found=_listing(folder),
-            fix=f"brrp fetch clip --clip-dir {folder}",
+            fix=f"brrp fetch clip --clip-dir {quote(str(folder))}",
         )
     raise RetrievalError(
         "The CLIP folder is not complete",
@@ -102,7 +103,7 @@ def find_clip_files(folder: Path) -> ClipFiles:
         expected="; ".join(missing),
         found=", ".join(str(path.relative_to(folder)) for path in found.values()),
         fix=f"bring what is missing from huggingface.co/{name} (all from one repository); "
-        f"brrp fetch clip --clip-dir {folder} brings all of {next(iter(LAYOUTS))}",
+        f"brrp fetch clip --clip-dir {quote(str(folder))} brings all of {next(iter(LAYOUTS))}",
     )
 
 

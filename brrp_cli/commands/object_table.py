@@ -1,0 +1,159 @@
+"""What `brrp reconstruct` tells of each object: one aligned table, with warnings where due."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import click
+import numpy as np
+
+from brrp_cli.reconstruction import METRES, OK
+
+if TYPE_CHECKING:
+    from brrp_cli.frames.frame import Frame
+    from brrp_cli.reconstruction import ObjectReconstruction, Reconstruction
+
+# Right placements score 0.8 and more; "not in the prior" counts as 0.7.
+LOW_SCORE = 0.75
+# The longest side, metres, of what stands on tables.
+PLAUSIBLE = 0.01, 0.8
+_HEAD = ("id", "taken for", "weight", "size", "± mm", "s", "")
+_RIGHT = ("id", "weight", "size", "± mm", "s")
+
+
+@dataclass(frozen=True)
+class Told:
+    """What is told of one object.
+
+    taken_for : the stored object, None = none of them or nothing known; how : "recognised", "not in
+    the prior", "retrieved" (a method that weighs no placements) or "" (one without a prior)
+    weight : of that in the posterior, or the probability of what was retrieved
+    size_factor : of a recognised object, over its stored size
+    uncertainty : mean over the mesh, metres; None in other units
+    """
+
+    object_id: int
+    status: str
+    message: str
+    taken_for: str | None
+    how: str
+    weight: float | None
+    size_factor: float | None
+    uncertainty: float | None
+    seconds: float
+    warnings: tuple[str, ...]
+
+    def record(self) -> dict[str, Any]:
+        """For --json; metres."""
+        return {
+            "id": self.object_id,
+            "status": self.status,
+            "message": self.message,
+            "taken_for": self.taken_for,
+            "how": self.how,
+            "weight": self.weight,
+            "size_factor": self.size_factor,
+            "mean_uncertainty_m": self.uncertainty,
+            "seconds": round(self.seconds, 3),
+            "warnings": list(self.warnings),
+        }
+
+
+def told(result: Reconstruction) -> list[Told]:
+    """All objects, in their order."""
+    return [_told(item, result.frame) for item in result.objects]
+
+
+def _told(item: ObjectReconstruction, frame: Frame) -> Told:
+    name, how, weight, size = _outcome(item)
+    surface = item.surface
+    in_metres = surface is not None and surface.uncertainty_unit == METRES
+    return Told(
+        object_id=item.object_id,
+        status=item.status,
+        message=item.message,
+        taken_for=name,
+        how=how,
+        weight=weight,
+        size_factor=size,
+        uncertainty=float(surface.uncertainty.mean()) if surface and in_metres else None,
+        seconds=sum(item.seconds.values()),
+        warnings=tuple(_warnings(item, frame)),
+    )
+
+
+def _outcome(
+    item: ObjectReconstruction,
+) -> tuple[str | None, str, float | None, float | None]:
+    """`taken_for`, `how`, `weight` and `size_factor` of `Told`."""
+    found = item.recognised
+    if found is not None:
+        return found.name, "recognised", found.weight, found.size_factor
+    if item.unknown_weight is not None:
+        return None, "not in the prior", item.unknown_weight, None
+    if item.retrieved:
+        best = item.retrieved[0]
+        return best.name, "retrieved", best.probability, None
+    return None, "", None, None
+
+
+def _warnings(item: ObjectReconstruction, frame: Frame) -> list[str]:
+    """What speaks against trusting the object as it is."""
+    found = []
+    best = item.recognised
+    if best is not None and best.alignment_score is not None and best.alignment_score < LOW_SCORE:
+        found.append(f"low alignment score {best.alignment_score:.2f}")
+    if best is None and item.unknown_weight is not None and item.unknown_weight < 0.5:
+        found.append("no object has half of the weight")
+    if item.surface is not None:
+        from brrp_cli.ground_truth.pieces import count_pieces
+
+        pieces = count_pieces(item.surface.as_trimesh())
+        if pieces > 1:
+            found.append(f"mesh in {pieces} pieces")
+        longest = float(np.ptp(item.surface.vertices, axis=0).max())
+        if not PLAUSIBLE[0] <= longest <= PLAUSIBLE[1]:
+            found.append(f"{longest * 100:.3g} cm long: suspect the unit of depth")
+    mask = frame.segmap == item.object_id
+    if mask[[0, -1]].any() or mask[:, [0, -1]].any():
+        found.append("mask at the image's border")
+    return found
+
+
+def lines(table: list[Told]) -> list[str]:
+    """The table for a terminal, head first; colours are taken out where stdout is none."""
+    rows = [_HEAD, *(_row(each) for each in table)]
+    widths = [max(len(row[i]) for row in rows) for i in range(len(_HEAD) - 1)]
+    found = []
+    for number, row in enumerate(rows):
+        cells = [
+            cell.rjust(width) if name in _RIGHT else cell.ljust(width)
+            for name, cell, width in zip(_HEAD, row, widths, strict=False)
+        ]
+        text = "  " + "  ".join(cells)
+        if number == 0:
+            found.append(click.style(text.rstrip(), bold=True))
+        else:
+            colour = "yellow" if table[number - 1].status == OK else "red"
+            notes = "  " + click.style(row[-1], fg=colour) if row[-1] else ""
+            found.append((text + notes).rstrip())
+    return found
+
+
+def _row(each: Told) -> tuple[str, ...]:
+    name = each.taken_for or each.how or "-"
+    if each.how == "retrieved":
+        name += " (retrieved)"
+    # Of a failure the log has told the rest.
+    said = each.message.split("\n")[0]
+    status = [] if each.status == OK else [each.status]
+    return (
+        str(each.object_id),
+        name,
+        "-" if each.weight is None else f"{each.weight:.2f}",
+        "-" if each.size_factor is None else f"{each.size_factor:.2f}",
+        "-" if each.uncertainty is None else f"{each.uncertainty * 1000:.1f}",
+        f"{each.seconds:.1f}",
+        "; ".join([*status, *([said] if said else []), *each.warnings]),
+    )
