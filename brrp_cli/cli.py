@@ -16,7 +16,8 @@ from brrp_cli.version import __version__
 
 # command -> (module, one line for `brrp --help`), so that help needs no import of a command.
 COMMANDS = {
-    "build-prior": ("build_prior", "Turn a folder of meshes into a prior."),
+    "build-prior": ("build_prior", "Turn folders of meshes into a prior."),
+    "prior": ("prior", "Add objects to a prior, remove, merge, list, show them."),
     "info": ("info", "Show what a prior holds and how it was made."),
     "verify": ("verify", "Check every byte of a prior."),
     "frame": ("frame", "Turn colour and depth images into a frame; find the objects."),
