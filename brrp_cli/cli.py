@@ -16,7 +16,8 @@ from brrp_cli.version import __version__
 
 # command -> (module, one line for `brrp --help`), so that help needs no import of a command.
 COMMANDS = {
-    "build-prior": ("build_prior", "Turn a folder of meshes into a prior."),
+    "build-prior": ("build_prior", "Turn folders of meshes into a prior."),
+    "prior": ("prior", "Add objects to a prior, remove, merge, list, show them."),
     "info": ("info", "Show what a prior holds and how it was made."),
     "verify": ("verify", "Check every byte of a prior."),
     "frame": ("frame", "Turn colour and depth images into a frame; find the objects."),
@@ -25,7 +26,7 @@ COMMANDS = {
     "view": ("view", "Look at results in one HTML page, offline."),
     "export": ("export", "Turn results into collision shapes: URDF, MJCF, a cuRobo world."),
     "config": ("config", "Show every number that decides a result."),
-    "fetch": ("fetch", "Bring CLIP, or the models that make masks by a prompt."),
+    "fetch": ("fetch", "Bring CLIP, models that make masks, or meshes."),
     "eval": ("eval", "Measure methods on scenes whose truth is known."),
     "demo": ("demo", "Run the whole path on a made scene and score it."),
 }

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
@@ -14,9 +15,12 @@ from brrp_cli.prior.parameters import UNITS, BuildParameters
 from brrp_cli.progress import note, quiet
 from brrp_cli.retrieval.clip.model_files import clip_folder
 
+if TYPE_CHECKING:
+    from brrp_cli.prior.manifest import Manifest
+
 
 @click.command("build-prior")
-@click.argument("meshes", type=click.Path(path_type=Path))
+@click.argument("meshes", type=click.Path(path_type=Path), nargs=-1, required=True)
 @click.option("-o", "--out", type=click.Path(path_type=Path), help="Folder of the prior.")
 @click.option(
     "--descriptions",
@@ -42,7 +46,7 @@ from brrp_cli.retrieval.clip.model_files import clip_folder
 )
 @click.option("--overwrite", is_flag=True, help="Replace a prior that has other parameters.")
 def command(
-    meshes: Path,
+    meshes: tuple[Path, ...],
     out: Path | None,
     descriptions: Path | None,
     units: str,
@@ -52,7 +56,7 @@ def command(
     clip_dir: Path | None,
     overwrite: bool,
 ) -> None:
-    """Turn the meshes in the folder MESHES into a prior.
+    """Turn the meshes in the folder MESHES, or in several folders, into a prior.
 
     MESHES holds files (OBJ, PLY, STL, OFF, GLB), or folders such as those of the YCB archive
     (NNN_name/google_16k/textured.obj). A second run does only what is missing or changed. Without
@@ -60,7 +64,7 @@ def command(
 
     \b
     Example:
-      brrp build-prior ycb/ -o prior/
+      brrp build-prior ycb/ household/ -o prior/
       brrp build-prior bop/models/ --units mm --descriptions names.csv
 
     Exit codes: 0 all meshes are in, 3 some failed, 1 none.
@@ -79,8 +83,7 @@ def command(
         progress=not quiet(),
     )
     manifest = report.manifest
-    for failure in manifest.failed:
-        click.echo(f"failed: {failure.source}: {failure.reason}", err=True)
+    told_failures(manifest)
     if report.removed:
         click.echo(f"no longer among the meshes, so removed: {', '.join(report.removed)}", err=True)
     size = sum(shard.bytes for shard in manifest.shards) / 1e6
@@ -89,12 +92,18 @@ def command(
         f"{len(manifest.failed)} failed) in {len(manifest.shards)} shards, {size:.1f} MB, "
         f"written to {report.path}"
     )
-    _keep_descriptions(report.path, clip_dir)
+    keep_descriptions(report.path, clip_dir)
     if manifest.failed:
         sys.exit(3)
 
 
-def _keep_descriptions(folder: Path, clip_dir: Path | None) -> None:
+def told_failures(manifest: Manifest) -> None:
+    """One line on stderr for each mesh that did not become an object."""
+    for failure in manifest.failed:
+        click.echo(f"failed: {failure.source}: {failure.reason}", err=True)
+
+
+def keep_descriptions(folder: Path, clip_dir: Path | None) -> None:
     """Let CLIP read the descriptions now, where there is CLIP: later its vision model is enough."""
     clip = clip_folder(clip_dir)
     if clip is None:

@@ -9,10 +9,11 @@ import click
 from brrp_cli.retrieval.clip.model_files import CLIP_DIR_VARIABLE, clip_cache, named_clip_folder
 
 PRECISIONS = {"clip": ("full", "8bit"), "masks": ("full", "4bit")}
+MESHES = ("ycb", "household")
 
 
 @click.command("fetch")
-@click.argument("what", type=click.Choice(list(PRECISIONS)))
+@click.argument("what", type=click.Choice([*PRECISIONS, *MESHES]))
 @click.option(
     "--precision",
     type=click.Choice(["full", "8bit", "4bit"]),
@@ -32,21 +33,34 @@ PRECISIONS = {"clip": ("full", "8bit"), "masks": ("full", "4bit")}
     help="Folder to fill with the models of masks. [default: BRRP_MASKS_DIR, else the cache]",
 )
 @click.option(
+    "-o",
+    "--out",
+    type=click.Path(path_type=Path),
+    help="Folder to fill with meshes. [default: meshes/ycb or meshes/household in the user's data "
+    "folder]",
+)
+@click.option(
     "--from",
     "source",
     metavar="ADDRESS|FOLDER",
     help="Where the files lie, in the layout of the repository (masks: of both, in detector/ and "
-    "segmenter/). [default: the Hugging Face hub]",
+    "segmenter/). [default: the Hugging Face hub; meshes: where their authors have them]",
 )
 def command(
-    what: str, precision: str, clip_dir: Path | None, masks_dir: Path | None, source: str | None
+    what: str,
+    precision: str,
+    clip_dir: Path | None,
+    masks_dir: Path | None,
+    out: Path | None,
+    source: str | None,
 ) -> None:
-    """Bring CLIP ViT-B/16, which retrieves objects by their look, or the models that make masks by
-    a prompt: Grounding DINO tiny and MobileSAM.
+    """Bring CLIP ViT-B/16, which retrieves objects by their look; the models that make masks by
+    a prompt, Grounding DINO tiny and MobileSAM; or meshes to build a prior from: 57 objects of YCB
+    (CC BY 4.0), 224 household objects (CC0).
 
     Every file is checked against its size and sha256 before it is used. A download that was cut
     goes on when the command is run again. `brrp reconstruct` then uses CLIP by itself. For a
-    machine without a network: fetch with --clip-dir or --masks-dir on another one and bring the
+    machine without a network: fetch with --clip-dir, --masks-dir or -o on another one and bring the
     folder.
 
     \b
@@ -55,14 +69,21 @@ def command(
       brrp fetch clip --precision 8bit --clip-dir clip/
       brrp fetch masks --precision 4bit
       brrp fetch clip --from https://mirror.example/clip-vit-base-patch16
+      brrp fetch household -o household/
     """
-    if precision not in PRECISIONS[what]:
+    if out is not None and what not in MESHES:
+        raise click.UsageError("-o goes with meshes: `brrp fetch ycb`, `brrp fetch household`")
+    if what in MESHES and precision != "full":
+        raise click.UsageError(f"{what} comes in full precision")
+    if what not in MESHES and precision not in PRECISIONS[what]:
         raise click.UsageError(f"{what} comes in {' and '.join(PRECISIONS[what])}")
     if clip_dir is not None and what != "clip":
         raise click.UsageError("--clip-dir goes with `brrp fetch clip`")
     if masks_dir is not None and what != "masks":
         raise click.UsageError("--masks-dir goes with `brrp fetch masks`")
-    if what == "clip":
+    if what in MESHES:
+        _meshes(what, out, source)
+    elif what == "clip":
         _clip(precision, clip_dir, source)
     else:
         _masks(precision, masks_dir, source)
@@ -105,4 +126,26 @@ def _masks(precision: str, masks_dir: Path | None, source: str | None) -> None:
     click.echo(
         f"Grounding DINO tiny, {precision}, and MobileSAM, {size:.0f} MB: {brought} files fetched, "
         f'{len(files) - brought} there already, all checked: {folder}. Use: --prompt "small object"'
+    )
+
+
+def _meshes(what: str, out: Path | None, source: str | None) -> None:
+    from brrp_cli.fetch.meshes import fetch_meshes, read_mesh_set
+    from brrp_cli.prior.locate import data_folder
+    from brrp_cli.progress import note
+
+    meshes = read_mesh_set(what)
+    folder = out or data_folder() / "meshes" / what
+    fetched = fetch_meshes(meshes, source, folder)
+    if fetched.unchecked:
+        note(
+            f"{len(fetched.unchecked)} textures have no known sum and were taken as they came, "
+            f"such as {fetched.unchecked[0]}"
+        )
+    size = sum(file.bytes for file in meshes.files) / 1e6
+    there = len(meshes.files) - len(fetched.brought)
+    click.echo(
+        f"{meshes.title} ({meshes.licence}), {size:.0f} MB: {len(fetched.brought)} files fetched, "
+        f"{there} there already, {'' if fetched.unchecked else 'all '}checked: {folder}. "
+        f"Use: brrp build-prior {folder}"
     )

@@ -59,6 +59,33 @@ def download(url: str, part: Path, size: int, advance: Callable[[int], None]) ->
             have = _length(part, size)
 
 
+def remote_size(url: str) -> int:
+    """Bytes of the file at `url`, as its server tells before it sends it. Errors: FetchError."""
+    requests = import_library("requests")
+    for tries in range(1, TRIES + 1):
+        try:
+            headers = {"Accept-Encoding": "identity"}
+            with requests.get(url, headers=headers, stream=True, timeout=TIMEOUT) as answer:
+                if answer.status_code == 429 or answer.status_code >= 500:
+                    raise _CutError(f"HTTP {answer.status_code} {answer.reason}")
+                if answer.status_code != 200:
+                    raise _not_given(url, answer)
+                length = answer.headers.get("Content-Length", "")
+        except (requests.RequestException, _CutError) as error:
+            if tries == TRIES or not _worth_a_try(error):
+                raise _unreachable(url, error) from error
+            time.sleep(PAUSE * 2 ** (tries - 1))
+        else:
+            break
+    if not length.isdigit():
+        raise FetchError(
+            "The server does not say how large the file is",
+            where=url,
+            fix="choose another source with --from",
+        )
+    return int(length)
+
+
 def _length(part: Path, size: int) -> int:
     """Bytes that are there; a part longer than the file is of another one and goes."""
     have = part.stat().st_size if part.exists() else 0
@@ -86,12 +113,7 @@ def _receive(
         if answer.status_code == 429 or answer.status_code >= 500:
             raise _CutError(f"HTTP {answer.status_code} {answer.reason}")
         if answer.status_code not in (200, 206):
-            raise FetchError(
-                "The server does not give the file",
-                where=url,
-                found=f"HTTP {answer.status_code} {answer.reason}",
-                fix="check the address; --from names another one",
-            )
+            raise _not_given(url, answer)
         _refuse_other_size(answer, url, have, size)
         goes_on = answer.status_code == 206
         if not goes_on:
@@ -137,6 +159,15 @@ def _other_size(url: str, size: int, found: str) -> FetchError:
     )
 
 
+def _not_given(url: str, answer: requests.Response) -> FetchError:
+    return FetchError(
+        "The server does not give the file",
+        where=url,
+        found=f"HTTP {answer.status_code} {answer.reason}",
+        fix="check the address; --from names another one",
+    )
+
+
 def _worth_a_try(error: Exception) -> bool:
     requests = import_library("requests")
     lasting = (requests.exceptions.InvalidURL, requests.exceptions.SSLError)
@@ -153,13 +184,16 @@ def _failed(url: str, part: Path, size: int, error: Exception) -> FetchError:
             found=f"{have} of {size} bytes, which are kept; {_reason(error)}",
             fix="run the same command again to go on",
         )
+    return _unreachable(url, error)
+
+
+def _unreachable(url: str, error: Exception) -> FetchError:
     return FetchError(
         f"{urlsplit(url).netloc} cannot be reached",
         where=url,
         found=_reason(error),
         fix="check the network and the proxy (HTTPS_PROXY). Without a network: run this command "
-        "with --clip-dir FOLDER on a machine that has one, bring the folder, and name it with "
-        "--clip-dir or BRRP_CLIP_DIR",
+        "with -o, --masks-dir or --clip-dir FOLDER on a machine that has one, and bring the folder",
     )
 
 

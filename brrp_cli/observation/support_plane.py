@@ -75,7 +75,7 @@ def largest_plane(
     RANSAC (on `drawn_points` at most), then least squares on all inliers. None where fewer than
     `min_points` points are nearer than `tolerance`, metres.
     """
-    if len(points) < MIN_PLANE_POINTS:
+    if len(points) < max(3, min_points):
         return None
     drawn = points
     if len(points) > drawn_points:

@@ -26,6 +26,9 @@ from brrp_cli.files import atomic_path, sha256_file
 from brrp_cli.prior.manifest import Manifest, ObjectEntry, ShardEntry
 from brrp_cli.prior.shard import damaged, open_shard, read_appearance
 
+# (name, input_sha256) -> an object's row.
+Rows = dict[tuple[str, str], Any]
+
 # Views, and poses, that anybody may ask for.
 _MOST = 10_000
 
@@ -39,9 +42,15 @@ def sidecar_file(objects: Sequence[ObjectEntry], parameters: dict[str, Any]) -> 
 
 
 def write_sidecar(
-    folder: Path, objects: Sequence[ObjectEntry], parameters: dict[str, Any]
+    folder: Path,
+    objects: Sequence[ObjectEntry],
+    parameters: dict[str, Any],
+    kept: Rows | None = None,
 ) -> ShardEntry:
-    """Write the file of these objects, whole or not at all. Errors: PriorError, OutputError."""
+    """Write the file of these objects, whole or not at all. Errors: PriorError, OutputError.
+
+    kept : rows that are known already, so that their shards need not be read
+    """
     file = sidecar_file(objects, parameters)
     kind = row_type(parameters)
     header = {
@@ -52,9 +61,18 @@ def write_sidecar(
     # Written, not mapped: on a full disk a map ends the process without a word.
     with atomic_path(folder / file) as partial, partial.open("wb") as stream:
         np.lib.format.write_array_header_1_0(stream, header)
-        for row in _rows(kind, folder, objects):
+        for row in _rows(kind, folder, objects, kept or {}):
             stream.write(row.tobytes())
     return ShardEntry(file, sha256_file(folder / file), (folder / file).stat().st_size)
+
+
+def kept_rows(folder: Path, manifest: Manifest) -> Rows:
+    """The rows of a prior's file; none where it is missing or damaged."""
+    entry = manifest.appearance
+    if not is_whole(folder, entry):
+        return {}
+    table = np.asarray(read_sidecar(folder, entry, manifest.parameters, len(manifest.objects)))
+    return {(o.name, o.input_sha256): table[row] for row, o in enumerate(manifest.objects)}
 
 
 def is_whole(folder: Path, entry: ShardEntry) -> bool:
@@ -96,7 +114,7 @@ def restore_sidecar(folder: Path, manifest: Manifest) -> NDArray[Any]:
     try:
         made = write_sidecar(folder, manifest.objects, manifest.parameters)
     except OutputError:
-        rows = _rows(row_type(manifest.parameters), folder, manifest.objects)
+        rows = _rows(row_type(manifest.parameters), folder, manifest.objects, {})
         return np.stack(list(rows))
     if made != entry:
         raise damaged(path, "descriptors that are not those that the manifest vouches for")
@@ -126,24 +144,33 @@ def row_type(parameters: dict[str, Any]) -> np.dtype[Any]:
 
 
 def _rows(
-    kind: np.dtype[Any], folder: Path, objects: Sequence[ObjectEntry]
-) -> Iterator[NDArray[Any]]:
-    """A row () for each object."""
-    for found in _from_shards(folder, objects):
-        row = np.zeros((), kind)
-        poses = len(found.sizes)
-        if len(found.colour) != len(row["colour"]) or poses > len(row["sizes"]):
-            raise damaged(folder, "shards with more or fewer views than the manifest tells")
-        row["colour"] = found.colour
-        row["pairs"] = found.pairs
-        row["sizes"] = np.nan
-        row["sizes"][:poses] = found.sizes
-        yield row
-
-
-def _from_shards(folder: Path, objects: Sequence[ObjectEntry]) -> Iterator[Appearance]:
-    """The descriptors of each object; a shard is opened once, since it holds a run of names."""
+    kind: np.dtype[Any], folder: Path, objects: Sequence[ObjectEntry], kept: Rows
+) -> Iterator[Any]:
+    """A row () for each object; a shard is opened once, since it holds a run of names, and only for
+    rows that are not `kept`."""
     for file, members in groupby(objects, key=lambda entry: entry.shard):
-        with open_shard(folder / file) as shard:
-            for entry in members:
-                yield read_appearance(shard, entry.name)
+        entries = list(members)
+        new = [entry.name for entry in entries if (entry.name, entry.input_sha256) not in kept]
+        read = _from_shard(folder / file, new) if new else {}
+        for entry in entries:
+            if entry.name in read:
+                yield _row(kind, folder, read[entry.name])
+            else:
+                yield kept[entry.name, entry.input_sha256]
+
+
+def _row(kind: np.dtype[Any], folder: Path, found: Appearance) -> NDArray[Any]:
+    row = np.zeros((), kind)
+    poses = len(found.sizes)
+    if len(found.colour) != len(row["colour"]) or poses > len(row["sizes"]):
+        raise damaged(folder, "shards with more or fewer views than the manifest tells")
+    row["colour"] = found.colour
+    row["pairs"] = found.pairs
+    row["sizes"] = np.nan
+    row["sizes"][:poses] = found.sizes
+    return row
+
+
+def _from_shard(path: Path, names: Sequence[str]) -> dict[str, Appearance]:
+    with open_shard(path) as shard:
+        return {name: read_appearance(shard, name) for name in names}

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, is_dataclass
 from typing import Any
 
 from brrp_cli.config import FeatureConfig
@@ -99,6 +99,34 @@ class BuildParameters:
         """As JSON gives it back: tuples are lists."""
         plain: dict[str, Any] = json.loads(json.dumps(asdict(self)))
         return plain
+
+
+def restore_parameters(table: Mapping[str, Any], where: object) -> BuildParameters:
+    """The parameters that `as_dict` made a table of. Errors: PriorError for those of a brrp with
+    other ones."""
+    try:
+        restored: BuildParameters = _restored(BuildParameters, table)
+        same = restored.as_dict() == table
+    except (TypeError, ValueError, KeyError):
+        same = False
+    if not same:
+        raise PriorError(
+            "The prior was built by a brrp with other parameters",
+            where=where,
+            found="; ".join(differences(BuildParameters().as_dict(), table)[:5]),
+            fix="build it anew: brrp build-prior MESHES/ --overwrite",
+        )
+    return restored
+
+
+def _restored(kind: Any, table: Mapping[str, Any]) -> Any:
+    values = dict(table)
+    for name, default in vars(kind()).items():
+        if is_dataclass(default):
+            values[name] = _restored(type(default), values[name])
+        elif isinstance(default, tuple):
+            values[name] = tuple(values[name])
+    return kind(**values)
 
 
 def differences(old: Mapping[str, Any], new: Mapping[str, Any], prefix: str = "") -> list[str]:

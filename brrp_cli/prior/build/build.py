@@ -1,21 +1,22 @@
-"""Build a prior from a folder of meshes: only what is missing or changed, whatever fails."""
+"""Build a prior from folders of meshes: only what is missing or changed, whatever fails."""
 
 from __future__ import annotations
 
 import logging
-from collections.abc import Iterator
+import shutil
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 from brrp_cli.errors import BrrpError, DependencyError, MeshError, PriorError
 from brrp_cli.executors import run_tasks
-from brrp_cli.files import sha256_file
-from brrp_cli.prior.appearance_file import is_whole, sidecar_file, write_sidecar
+from brrp_cli.files import atomic_path, sha256_file
+from brrp_cli.prior.appearance_file import Rows, is_whole, sidecar_file, write_sidecar
 from brrp_cli.prior.appearance_index import open_appearance_index
 from brrp_cli.prior.build.descriptions import describe, read_descriptions
-from brrp_cli.prior.build.find_meshes import MeshSource, find_meshes
+from brrp_cli.prior.build.find_meshes import MeshSource, find_all_meshes
 from brrp_cli.prior.build.lock import only_builder
 from brrp_cli.prior.build.make_object import make_object
 from brrp_cli.prior.build.mesh_files import input_sha256
@@ -35,7 +36,7 @@ from brrp_cli.prior.manifest import (
 )
 from brrp_cli.prior.pack import pack
 from brrp_cli.prior.parameters import BuildParameters, refuse_differences
-from brrp_cli.prior.shard import StoredObject, open_shard, read_stored, write_shard
+from brrp_cli.prior.shard import StoredObject, damaged, open_shard, read_stored, write_shard
 from brrp_cli.stop import sigterm_raises, stopped
 from brrp_cli.threads import cores
 
@@ -57,7 +58,7 @@ class BuildReport:
 
 
 def build_prior(
-    meshes: Path,
+    meshes: Path | Sequence[Path],
     out: Path,
     parameters: BuildParameters | None = None,
     *,
@@ -67,7 +68,7 @@ def build_prior(
     time_limit: float = TIME_LIMIT,
     progress: bool = False,
 ) -> BuildReport:
-    """Make the prior in `out` hold the objects of the folder `meshes`, and no others.
+    """Make the prior in `out` hold the objects of the folder or folders `meshes`, and no others.
 
     The same meshes and parameters give the same bytes, however many workers run and however often
     the build was interrupted. Errors: MeshError when there are no meshes or all of them fail;
@@ -77,58 +78,56 @@ def build_prior(
     """
     refuse_foreign(out)
     table = (parameters or BuildParameters()).as_dict()
-    sources = {source.name: source for source in find_meshes(meshes)}
+    places = [meshes] if isinstance(meshes, Path) else list(meshes)
+    sources = {source.name: source for source in find_all_meshes(places)}
     given = read_descriptions(descriptions) if descriptions else {}
     phrases = describe(sources, given)
-    with _stop_told(out), sigterm_raises(), only_builder(out):
-        before = _previous(out)
+    with sole_builder(out):
+        before = previous_manifest(out)
         if before is not None and not overwrite:
             refuse_differences(before.parameters, table, out)
-        run = _Run(out, table, sources, reusable_objects(out, before, table))
+        run = Run(out, table, sources, reusable_objects(out, before, table))
         run.hash_inputs()
         run.make(parameters or BuildParameters(), workers or cores(), time_limit, progress)
         if not run.done:
             raise MeshError(
                 "None of the meshes became an object",
-                where=meshes,
+                where=" and ".join(map(str, places)),
                 found="\n".join(f"{f.source}: {f.reason}" for f in run.failures()),
             )
-        manifest = run.manifest(phrases, before)
-        if before is None or before.as_bytes() != manifest.as_bytes():
-            write_manifest(out, manifest)
-        # Now, so that not the first to open the prior pays for it.
-        open_appearance_index(out, read_index(out), lambda: manifest)
-        _sweep(out, manifest)
-    names = {entry.name for entry in manifest.objects}
-    return BuildReport(
-        path=out,
-        manifest=manifest,
-        made=sorted(run.made),
-        kept=sorted(names - set(run.made)),
-        removed=sorted({e.name for e in before.objects} - names if before else ()),
-    )
+        return run.commit(phrases, before)
 
 
 GO_ON = "run the same command again to go on"
 
 
 @contextmanager
-def _stop_told(out: Path) -> Iterator[None]:
-    """Ctrl-C or SIGTERM becomes a StoppedError, wherever it came."""
+def sole_builder(out: Path) -> Iterator[None]:
+    """Hold the prior's lock. Ctrl-C or SIGTERM becomes a StoppedError, wherever it came."""
     try:
-        yield
+        with sigterm_raises(), only_builder(out):
+            yield
     except KeyboardInterrupt as stop:
         raise stopped(stop, where=out, found="what was finished is kept", fix=GO_ON) from None
 
 
 @dataclass
-class _Run:
-    """What is known while a build goes on, by name of object."""
+class Run:
+    """What is known while a build goes on, by name of object.
+
+    old : entries of objects that stay without a mesh being read; known : shards of theirs, whose
+    sums need not be taken again; rows : their appearance;
+    failed_before : failures that stay told
+    """
 
     out: Path
     parameters: dict[str, Any]
     sources: dict[str, MeshSource]
     stock: Reusable
+    old: dict[str, ObjectEntry] = field(default_factory=dict)
+    known: dict[str, ShardEntry] = field(default_factory=dict)
+    rows: Rows = field(default_factory=dict)
+    failed_before: dict[str, Failure] = field(default_factory=dict)
     hashes: dict[str, str] = field(default_factory=dict)
     failed: dict[str, str] = field(default_factory=dict)
     made: dict[str, None] = field(default_factory=dict)
@@ -201,52 +200,89 @@ class _Run:
         if not here:
             return
         file = shard_file(self.parameters, here)
-        if any(name in self.waiting or self.stock[name, sha].shard != file for name, sha in here):
+        origins = {
+            (None, "") if name in self.waiting else self.stock[name, sha].place
+            for name, sha in here
+        }
+        if origins == {(None, file)}:
+            records = [self.stock[key].record for key in here]
+        elif whole := _only(origins, file):
+            self._copy(whole, file)
+            records = [self.stock[key].record for key in here]
+        else:
+            self.known.pop(file, None)
             objects = [self._stored(name, sha) for name, sha in here]
             write_shard(self.out / file, objects, self.parameters)
             records = [stored.record for stored in objects]
             # Not before: Ctrl-C in the middle of writing must lose none of them.
             for name, _ in here:
                 self.waiting.pop(name, None)
-        else:
-            records = [self.stock[key].record for key in here]
         for (name, _), record in zip(here, records, strict=True):
             self.done[name] = Finished(file, record)
+
+    def _copy(self, folder: Path, file: str) -> None:
+        """Take over a whole shard of another prior."""
+        with atomic_path(self.out / file) as partial:
+            shutil.copyfile(folder / file, partial)
+            if sha256_file(partial) != self.known[file].sha256:
+                raise damaged(folder / file, "bytes that do not have the manifest's sha256")
 
     def _stored(self, name: str, sha256: str) -> StoredObject:
         if name in self.waiting:
             return self.waiting[name]
-        with open_shard(self.out / self.stock[name, sha256].shard) as shard:
-            return read_stored(shard, name)
+        finished = self.stock[name, sha256]
+        with open_shard((finished.folder or self.out) / finished.shard) as shard:
+            stored = read_stored(shard, name)
+        if stored.input_sha256 != sha256 or stored.record != finished.record:
+            raise damaged(f"{finished.shard}, {name}", "not what the manifest tells of it")
+        return stored
 
     def failures(self) -> list[Failure]:
         """The meshes that did not become objects."""
-        return [
-            Failure(name, self.sources[name].relative, self.failed[name])
-            for name in sorted(self.failed)
-        ]
+        failed = {name: f for name, f in self.failed_before.items() if name not in self.done}
+        for name, reason in self.failed.items():
+            failed[name] = Failure(name, self.sources[name].relative, reason)
+        return [failed[name] for name in sorted(failed)]
 
-    def manifest(self, phrases: dict[str, str], before: Manifest | None) -> Manifest:
-        """All that stands now."""
+    def commit(self, phrases: dict[str, str], before: Manifest | None) -> BuildReport:
+        """Write the manifest of all that stands now, and delete what is no longer needed."""
+        manifest = self._manifest(phrases, before)
+        if before is None or before.as_bytes() != manifest.as_bytes():
+            write_manifest(self.out, manifest)
+        # Now, so that not the first to open the prior pays for it.
+        open_appearance_index(self.out, read_index(self.out), lambda: manifest)
+        _sweep(self.out, manifest)
+        names = {entry.name for entry in manifest.objects}
+        return BuildReport(
+            path=self.out,
+            manifest=manifest,
+            made=sorted(self.made),
+            kept=sorted(names - set(self.made)),
+            removed=sorted({e.name for e in before.objects} - names if before else ()),
+        )
+
+    def _manifest(self, phrases: dict[str, str], before: Manifest | None) -> Manifest:
         files = sorted({finished.shard for finished in self.done.values()})
-        paths = {file: self.out / file for file in files}
-        objects = [
-            ObjectEntry(
-                name=name,
-                description=phrases[name],
-                source=self.sources[name].relative,
-                input_sha256=self.hashes[name],
-                shard=self.done[name].shard,
-                record=self.done[name].record,
-            )
-            for name in sorted(self.done)
-        ]
+        objects = [self._entry(name, phrases) for name in sorted(self.done)]
         return Manifest(
             parameters=self.parameters,
             objects=objects,
-            shards=[ShardEntry(f, sha256_file(p), p.stat().st_size) for f, p in paths.items()],
+            shards=[self.known.get(file) or _shard_entry(self.out, file) for file in files],
             failed=self.failures(),
             appearance=self._sidecar(objects, before),
+        )
+
+    def _entry(self, name: str, phrases: dict[str, str]) -> ObjectEntry:
+        finished = self.done[name]
+        if name in self.old and name not in self.sources:
+            return replace(self.old[name], shard=finished.shard)
+        return ObjectEntry(
+            name=name,
+            description=phrases[name],
+            source=self.sources[name].relative,
+            input_sha256=self.hashes[name],
+            shard=finished.shard,
+            record=finished.record,
         )
 
     def _sidecar(self, objects: list[ObjectEntry], before: Manifest | None) -> ShardEntry:
@@ -254,8 +290,17 @@ class _Run:
         entry = before.appearance if before is not None else None
         file = sidecar_file(objects, self.parameters)
         if entry is None or entry.file != file or not is_whole(self.out, entry):
-            entry = write_sidecar(self.out, objects, self.parameters)
+            entry = write_sidecar(self.out, objects, self.parameters, self.rows)
         return entry
+
+
+def _only(origins: set[tuple[Path | None, str]], file: str) -> Path | None:
+    """The other prior whose shard `file` holds all of the members, if there is one."""
+    return next((folder for folder, _ in origins if origins == {(folder, file)}), None)
+
+
+def _shard_entry(folder: Path, file: str) -> ShardEntry:
+    return ShardEntry(file, sha256_file(folder / file), (folder / file).stat().st_size)
 
 
 def make_stored(source: MeshSource, sha256: str, parameters: BuildParameters) -> StoredObject:
@@ -277,7 +322,9 @@ def _reason(error: BrrpError, source: MeshSource) -> str:
     return line.replace(str(source.path), source.relative)
 
 
-def _previous(out: Path) -> Manifest | None:
+def previous_manifest(out: Path) -> Manifest | None:
+    """The manifest that stands there, if one does that can be used. Errors: PriorError for one that
+    is not ours to replace."""
     if not (out / FILE).is_file():
         return None
     try:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -63,22 +64,50 @@ def find_meshes(folder: Path) -> list[MeshSource]:
     return sorted(sources, key=lambda source: source.name)
 
 
+def find_all_meshes(places: Sequence[Path]) -> list[MeshSource]:
+    """Objects in several places together, sorted by name.
+
+    A place is a folder of meshes (see find_meshes), a mesh file, or the folder of one object, such
+    as 025_mug/ of the YCB archive. Errors: those of find_meshes.
+    """
+    sources = [source for place in places for source in _at(place)]
+    _refuse_collisions(sources, " and ".join(map(str, places)))
+    return sorted(sources, key=lambda source: source.name)
+
+
+def _at(place: Path) -> list[MeshSource]:
+    if place.is_file() and place.suffix.lower() in SUFFIXES:
+        return [MeshSource(safe_name(place.stem), place, place.name)]
+    inner = next((p for p in OBJECT_FOLDERS if (place / p).is_file()), None)
+    if inner is None:
+        return find_meshes(place)
+    name = place.resolve().name
+    return [MeshSource(safe_name(name), place / inner, f"{name}/{inner}")]
+
+
 def _what_is_there(folder: Path) -> str:
     names = sorted(entry.name for entry in folder.iterdir())
     more = f" and {len(names) - 5} more" if len(names) > 5 else ""
     return (", ".join(names[:5]) + more) if names else "an empty folder"
 
 
-def _refuse_collisions(sources: list[MeshSource], folder: Path) -> None:
+def _refuse_collisions(sources: list[MeshSource], where: object) -> None:
     by_name = defaultdict(list)
     for source in sources:
         # Results are files named after objects, also on file systems that ignore case.
-        by_name[source.name.casefold()].append(source.relative)
-    clashes = [" and ".join(files) for files in by_name.values() if len(files) > 1]
+        by_name[source.name.casefold()].append(source)
+    clashes = [_told(same) for same in by_name.values() if len(same) > 1]
     if clashes:
         raise MeshError(
             "Several meshes would be objects of one name",
-            where=folder,
+            where=where,
             found="; ".join(clashes[:5]),
             fix="rename or move all but one of each",
         )
+
+
+def _told(same: list[MeshSource]) -> str:
+    """Files by their place in the folder; by their whole path where they have the same place."""
+    relative = [source.relative for source in same]
+    several = len(set(relative)) < len(relative)
+    return " and ".join([str(source.path) for source in same] if several else relative)

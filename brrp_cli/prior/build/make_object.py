@@ -35,14 +35,16 @@ def make_object(
     seconds : gets how long each stage took
     """
     seconds = {} if seconds is None else seconds
-    with timed(seconds, "load"):
-        original = load_mesh(source.path, parameters.units)
-        painted, trouble = _painted(source, original.copy(), parameters)
-    try:
-        return _from_mesh(source.name, original, painted, trouble, parameters, seconds)
-    except BrrpError as error:
-        error.where = error.where or source.path
-        raise
+    # trimesh divides by the areas of slivers and of flat parts, and NumPy would tell of each.
+    with np.errstate(divide="ignore", invalid="ignore"):
+        with timed(seconds, "load"):
+            original = load_mesh(source.path, parameters.units)
+            painted, trouble = _painted(source, original.copy(), parameters)
+        try:
+            return _from_mesh(source.name, original, painted, trouble, parameters, seconds)
+        except BrrpError as error:
+            error.where = error.where or source.path
+            raise
 
 
 def _painted(  # type: ignore[no-untyped-def]
@@ -66,8 +68,7 @@ def _from_mesh(  # type: ignore[no-untyped-def]
     # Far from the origin float32 has no digits left for the shape: work around the centre.
     offset = original.bounds.mean(axis=0)
     original.apply_translation(-offset)
-    # trimesh: centres of flat parts
-    with timed(seconds, "repair"), np.errstate(divide="ignore", invalid="ignore"):
+    with timed(seconds, "repair"):
         repaired = repair(original, parameters.repair)
     mesh = repaired.mesh
     with timed(seconds, "poses"):

@@ -19,10 +19,17 @@ log = logging.getLogger(__name__)
 
 @dataclass(frozen=True)
 class Finished:
-    """A finished object: its shard, relative to the prior, and its record."""
+    """A finished object: its shard, relative to the prior, and its record. `folder`: of the prior
+    where it lies, if that is another one than the prior that is made."""
 
     shard: str
     record: dict[str, Any]
+    folder: Path | None = None
+
+    @property
+    def place(self) -> tuple[Path | None, str]:
+        """Folder and shard."""
+        return self.folder, self.shard
 
 
 Reusable = dict[tuple[str, str], Finished]
@@ -52,6 +59,15 @@ def reusable_objects(
                 continue
             for entry in members[shard.file]:
                 stock[entry.name, entry.input_sha256] = Finished(shard.file, entry.record)
+    for key, finished in unlisted_objects(folder, listed, parameters).items():
+        stock.setdefault(key, finished)
+    return stock
+
+
+def unlisted_objects(folder: Path, listed: set[str], parameters: dict[str, Any]) -> Reusable:
+    """The objects in shards that a run left which was killed before it could write the manifest:
+    made with these parameters, read and checked one by one. listed : shards to pass over."""
+    stock: Reusable = {}
     for path in sorted((folder / "shards").glob("shard-*.h5")):
         file = f"shards/{path.name}"
         if file not in listed:

@@ -152,3 +152,16 @@ def test_what_encloses_nothing_is_refused() -> None:
     needles = triangles(np.eye(4, 3) * 0.1, np.array([[0, 1, 1], [0, 2, 2]]))
     with pytest.raises(MeshError, match="encloses nothing"):
         repair(needles)
+
+
+def test_edges_that_no_split_parts_do_not_stop_the_filling_of_holes() -> None:
+    """Faces across the inside of a box share edges with its walls; of these, a split of their
+    vertices leaves one with more than two faces. The hole to fill is in a ball beside the box."""
+    across = [[6, 3, 5], [3, 2, 4], [2, 0, 4]]
+    crossed = triangles(box().vertices, np.vstack([box().faces, across]))
+    ball = ball_with_small_hole()
+    ball.apply_translation((0.5, 0, 0))
+    repaired = repair(trimesh.util.concatenate([crossed, ball]))
+    assert is_solid(repaired.mesh)
+    assert any("no split parts" in step for step in repaired.record["steps"])
+    assert repaired.record["original_to_repaired"]["max"] < 0.03
