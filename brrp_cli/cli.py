@@ -24,6 +24,7 @@ COMMANDS = {
     "reconstruct": ("reconstruct", "Turn an RGBD frame into a closed mesh per object."),
     "view": ("view", "Look at results in one HTML page, offline."),
     "export": ("export", "Turn results into collision shapes: URDF, MJCF, a cuRobo world."),
+    "config": ("config", "Show every number that decides a result."),
     "fetch": ("fetch", "Bring CLIP, or the models that make masks by a prompt."),
     "eval": ("eval", "Measure methods on scenes whose truth is known."),
     "demo": ("demo", "Run the whole path on a made scene and score it."),

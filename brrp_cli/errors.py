@@ -74,6 +74,10 @@ def unexpected(error: BaseException) -> BrrpError:
     )
 
 
+class ConfigError(BrrpError):
+    """A configuration file has a key or a value that means nothing."""
+
+
 class FrameError(BrrpError):
     """A frame, or what is to become one, cannot be used."""
 

@@ -168,6 +168,7 @@ class Reconstruction:
     objects : one for each id in the mask, ascending; plane : the support plane, camera frame;
     retriever, prior_path, prior_digest : None where the method has no prior
     configuration : what decided the result, plain JSON
+    segmentation : the same of the masks, where they were made on the way; else None
     seconds : time of the stages that concern the whole frame.
     """
 
@@ -182,6 +183,7 @@ class Reconstruction:
     seed: int
     device: str
     seconds: dict[str, float] = field(default_factory=dict)
+    segmentation: dict[str, Any] | None = None
 
     @property
     def reconstructed(self) -> list[ObjectReconstruction]:

@@ -9,7 +9,13 @@ from typing import Any
 
 import click
 
-from brrp_cli.commands.method_options import OneOf, check_weights, methods_help, weights_help
+from brrp_cli.commands.method_options import (
+    CONFIG_HELP,
+    OneOf,
+    check_weights,
+    methods_help,
+    weights_help,
+)
 from brrp_cli.commands.retriever_option import RetrieverName
 from brrp_cli.methods.registry import COMPARED, METHODS, preset_names
 from brrp_cli.progress import note
@@ -73,6 +79,13 @@ def _selection(ctx: click.Context, option: click.Parameter, value: str | None) -
     help=f"Of {', '.join(preset_names())}. [default: each method's first]",
 )
 @click.option(
+    "--config",
+    "configs",
+    multiple=True,
+    callback=_several(click.Path(path_type=Path)),
+    help=f"{CONFIG_HELP} Several are compared.",
+)
+@click.option(
     "--k",
     "ks",
     multiple=True,
@@ -116,6 +129,7 @@ def command(
     methods: list[str],
     weights: list[Path],
     presets: list[str],
+    configs: list[Path],
     ks: list[int],
     retrievers: list[str],
     clip_dir: Path | None,
@@ -152,6 +166,7 @@ def command(
         data_root=data_root,
         methods=methods,
         presets=presets,
+        configs=configs,
         ks=ks,
         retrievers=retrievers,
         shifts=shifts,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,6 +12,7 @@ import click
 from brrp_cli.commands.export import CONFIDENCE, export
 from brrp_cli.commands.frame import refuse_existing
 from brrp_cli.commands.method_options import (
+    CONFIG_HELP,
     OneOf,
     check_options,
     check_weights,
@@ -30,6 +31,7 @@ from brrp_cli.retrieval.choose import RETRIEVERS, choose_retriever
 from brrp_cli.retrieval.clip.model_files import CLIP_DIR_VARIABLE
 
 if TYPE_CHECKING:
+    from brrp_cli.config.segmentation import SegmentConfig
     from brrp_cli.frames.frame import Frame
     from brrp_cli.methods.base import Method
     from brrp_cli.prior.store import Prior
@@ -65,6 +67,7 @@ NO_COLLISION = "none"
     type=OneOf(preset_names),
     help="A named configuration of the method. [default: its first]",
 )
+@click.option("--config", "file", type=click.Path(path_type=Path), help=CONFIG_HELP)
 @click.option("--k", type=click.IntRange(min=1), help="Retrieved objects. [default: the preset's]")
 @click.option(
     "--retriever",
@@ -109,6 +112,7 @@ def command(
     method: str,
     weights: Path | None,
     preset_name: str | None,
+    file: Path | None,
     k: int | None,
     retriever: str,
     clip_dir: Path | None,
@@ -144,6 +148,8 @@ def command(
       brrp reconstruct frame.npz --prior prior/ --poses bop
     """
     from brrp_cli.api import open_result, reconstruct
+    from brrp_cli.config.segmentation import SegmentConfig
+    from brrp_cli.methods.config_file import read_config
     from brrp_cli.results.bop import bop_csv
     from brrp_cli.results.write import check_output, write_results
 
@@ -152,14 +158,17 @@ def command(
     check_collision(collision, confidence)
     chosen = METHODS[method]
     check_options(chosen, preset_name, device)
+    read = None if file is None else read_config(file)
+    config = chosen.preset(preset_name) if read is None else read.config(chosen, preset_name)
+    config = replace(config, k=k) if k else config
     output = output or source.name.with_name(f"{source.name.name}_{method}")
     # What can be refused is refused before the work, not after it.
     frame = source.read()
     check_output(output, frame, coordinates, overwrite=overwrite)
+    masks = None
     if source.prompt is not None or not frame.object_ids:
-        frame = make_masks(source, frame, output, seed, overwrite=overwrite)
-    config = chosen.preset(preset_name)
-    config = replace(config, k=k) if k else config
+        masks = SegmentConfig() if read is None else read.segmentation()
+        frame = make_masks(source, frame, output, seed, masks, overwrite=overwrite)
     prior, retrieval = open_prior_of(chosen, prior_path, config, retriever, clip_dir, seed)
     if prior is None:
         trained = "" if weights is None else f", weights {weights}"
@@ -175,6 +184,8 @@ def command(
         device=device,
         workers=workers,
     )
+    if masks is not None:
+        result = replace(result, segmentation=asdict(masks))
     write_results(result, output, frame=coordinates, overwrite=overwrite)
     report(result)
     done = len(result.reconstructed)
@@ -198,7 +209,13 @@ def command(
 
 
 def make_masks(
-    source: SourceOptions, frame: Frame, output: Path, seed: int, *, overwrite: bool
+    source: SourceOptions,
+    frame: Frame,
+    output: Path,
+    seed: int,
+    config: SegmentConfig,
+    *,
+    overwrite: bool,
 ) -> Frame:
     """The frame with masks made on the way; a picture of them is written beside the output."""
     from brrp_cli.frames.build import require_objects
@@ -208,7 +225,7 @@ def make_masks(
         return require_objects(frame)
     picture = output.with_name(output.name + ".masks.png")
     refuse_existing([picture], overwrite)
-    frame = require_objects(source.make_masks(frame, seed))
+    frame = require_objects(source.make_masks(frame, seed, config))
     write_picture(frame, picture)
     how = f"the prompt {source.prompt!r}" if source.prompt else "what stands on the table"
     note(f"Masks: made on the way from {how}, {len(frame.object_ids)} objects: {picture}")

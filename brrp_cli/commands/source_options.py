@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 if TYPE_CHECKING:
+    from brrp_cli.config.segmentation import SegmentConfig
     from brrp_cli.frames.frame import Frame
 
 _PATH = click.Path(path_type=Path)
@@ -119,7 +120,7 @@ class SourceOptions:
             self.color, self.depth, self.intrinsics, self.masks, depth_scale=self.depth_scale
         )
 
-    def make_masks(self, frame: Frame, seed: int) -> Frame:
+    def make_masks(self, frame: Frame, seed: int, config: SegmentConfig | None = None) -> Frame:
         """The frame with masks made anew: by the prompt where there is one, else without a model.
 
         Errors: FrameError if nothing is found; MaskError if the models cannot be used.
@@ -129,7 +130,8 @@ class SourceOptions:
         from brrp_cli.segmentation.segment import segment
 
         if self.prompt is None:
-            return replace(frame, segmap=segment(frame, seed))
+            return replace(frame, segmap=segment(frame, seed, config))
         from brrp_cli.segmentation.prompted.segment_by_prompt import PromptSegmenter
 
-        return replace(frame, segmap=PromptSegmenter(self.masks_dir)(frame, self.prompt, seed))
+        segmenter = PromptSegmenter(self.masks_dir, config)
+        return replace(frame, segmap=segmenter(frame, self.prompt, seed))

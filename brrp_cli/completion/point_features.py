@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from brrp_cli.completion.convex_hull import outside_hull
-from brrp_cli.completion.visible_part import LEAST, MOST, VisiblePart
+from brrp_cli.completion.visible_part import VisiblePart
 from brrp_cli.frames.frame import BACKGROUND
 from brrp_cli.frames.projection import at_pixels, depth_behind
 from brrp_cli.geometry import transform_points
@@ -20,20 +20,16 @@ from brrp_cli.geometry import transform_points
 Array = NDArray[np.float64]
 Features = NDArray[np.float32]
 
-# Lengths beyond these tell nothing more, metres; ratios likewise.
-FAR = 0.2
-RATIO = 4.0
-# Metres, added to what a length is divided by that may be 0.
-THIN = 0.002
 # Lengths, of which the last are the object's own, the same at all points.
 COUNT, WHOLE = 52, 6
 
 
 def point_features(points: Array, part: VisiblePart) -> Features:
-    """(n, `COUNT`) of points (n, 3), metres, camera frame. Lengths stand in tenths of `FAR` and in
+    """(n, `COUNT`) of points (n, 3), metres, camera frame. Lengths stand in tenths of `far` and in
     the object's sizes; without a plane, heights count as in the middle of the object."""
-    frame, size = part.frame, part.size
-    behind = np.clip(np.nan_to_num(-depth_behind(points, frame)), -FAR, FAR)
+    frame, size, config = part.frame, part.size, part.config
+    far, ratio, thin = config.far, config.ratio, config.thin
+    behind = np.clip(np.nan_to_num(-depth_behind(points, frame)), -far, far)
     label = at_pixels(points, frame.segmap, frame)
     own = label == part.object_id
     ground = label == BACKGROUND
@@ -87,22 +83,22 @@ def point_features(points: Array, part: VisiblePart) -> Features:
         *_mirrored(points, 2 * across, part.across, part),
     ]
     whole = [
-        size / FAR,
+        size / far,
         part.top / size,
         part.width / size,
         length / size,
         part.depths.mean() / size,
-        np.quantile(part.depths, MOST[1]) / size,
+        np.quantile(part.depths, config.most[1]) / size,
     ]
-    columns = [np.clip(one / size, -RATIO, RATIO) for one in each + mirrored]
-    columns += [np.clip(one, -FAR, FAR) / (FAR / 10) for one in each]
+    columns = [np.clip(one / size, -ratio, ratio) for one in each + mirrored]
+    columns += [np.clip(one, -far, far) / (far / 10) for one in each]
     columns += [
         own,
         ground,
-        np.clip(behind / (silhouette + THIN), -RATIO, RATIO),
-        np.clip(height / max(part.top, LEAST), -1, RATIO),
-        np.clip(round_ / center, 0, RATIO),
-        np.clip(behind / (local_thickness + THIN), -RATIO, RATIO),
+        np.clip(behind / (silhouette + thin), -ratio, ratio),
+        np.clip(height / max(part.top, config.least), -1, ratio),
+        np.clip(round_ / center, 0, ratio),
+        np.clip(behind / (local_thickness + thin), -ratio, ratio),
         part.normals[nearest] @ part.ahead,
         np.abs(part.normals[nearest] @ part.across),
         part.normals[nearest] @ part.up,
@@ -114,8 +110,9 @@ def point_features(points: Array, part: VisiblePart) -> Features:
 def _mirrored(points: Array, twice: Array, direction: Array, part: VisiblePart) -> list[Array]:
     """Where each point's image lies, `twice` its distance from the mirror back along the unit
     `direction`: behind what is seen, within the silhouette, over the height_map."""
+    far = part.config.far
     image = points - twice[:, None] * direction
-    behind = np.clip(np.nan_to_num(-depth_behind(image, part.frame)), -FAR, FAR)
+    behind = np.clip(np.nan_to_num(-depth_behind(image, part.frame)), -far, far)
     silhouette = np.nan_to_num(at_pixels(image, part.silhouette, part.frame))
     over = (
         np.full(len(points), -part.top) if part.height_map is None else part.height_map.above(image)

@@ -11,11 +11,8 @@ from brrp_cli.frames.frame import BACKGROUND, Frame
 
 Image = NDArray[np.float32]
 
-# Radii at which limbs are measured.
-WIDTHS = 12
 
-
-def silhouettes(frame: Frame, object_id: int) -> tuple[Image, Image]:
+def silhouettes(frame: Frame, object_id: int, radii: int) -> tuple[Image, Image]:
     """`within_silhouette` and `local_thickness` (H, W) where the object is or may
     go on, 0 elsewhere."""
     rows, columns = np.nonzero(frame.segmap == object_id)
@@ -26,7 +23,7 @@ def silhouettes(frame: Frame, object_id: int) -> tuple[Image, Image]:
     )
     silhouette, limbs = np.zeros((2, *frame.shape), dtype=np.float32)
     silhouette[window] = within_silhouette(frame.segmap[window])
-    limbs[window] = local_thickness(silhouette[window])
+    limbs[window] = local_thickness(silhouette[window], radii)
     return silhouette, limbs
 
 
@@ -37,12 +34,12 @@ def within_silhouette(segmap: NDArray[np.integer]) -> Image:
     return distance_transform_edt(~ground)[1:-1, 1:-1].astype(np.float32)
 
 
-def local_thickness(within: Image) -> Image:
+def local_thickness(within: Image, radii: int) -> Image:
     """(H, W) pixels, the radius of the largest disc within the silhouette that has the pixel in
     it: of a handle or a stalk it is small, however large the object."""
     width = within.copy()
     top = float(within.max())
-    for radius in np.geomspace(2, top, WIDTHS) if top > 2 else ():
+    for radius in np.geomspace(2, top, radii) if top > 2 else ():
         reached = distance_transform_edt(within < radius) <= radius
         width[reached & (width < radius)] = radius
     return np.where(within > 0, width, 0).astype(np.float32)

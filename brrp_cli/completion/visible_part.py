@@ -21,12 +21,6 @@ Array = NDArray[np.float64]
 
 # Of the image: as good a guess as any where there is no plane.
 UPRIGHT = np.array([0.0, -1.0, 0.0])
-# Metres; smaller extents are as noisy as depth is.
-LEAST = 0.005
-# Shares of the seen points between which an object's size is taken: strays do not count.
-MOST = (0.02, 0.98)
-# Seen points whose spread gives a normal.
-NEIGHBOURS = 12
 
 
 @dataclass(frozen=True)
@@ -63,6 +57,7 @@ class VisiblePart:
     normals: Array
     silhouette: Image
     limbs: Image
+    config: CompletionConfig
 
     @property
     def up(self) -> Array:
@@ -84,8 +79,8 @@ def visible_part(
 ) -> VisiblePart:
     """From an object's observed points (n, 3), metres, camera frame, and its support plane."""
     seen = grid_subsample(points, config.cell).astype(np.float64)
-    low, high = np.quantile(seen, MOST, axis=0)
-    size = max(float(np.linalg.norm(high - low)), LEAST)
+    low, high = np.quantile(seen, config.most, axis=0)
+    size = max(float(np.linalg.norm(high - low)), config.least)
     up = UPRIGHT if plane is None else plane.normal
     if plane is None:
         feet, height_map, top = np.zeros((0, 3)), None, size / 2
@@ -93,14 +88,14 @@ def visible_part(
         height = np.maximum(plane.signed_distance(seen), 0.0)
         feet = seen - height[:, None] * up
         height_map = height_map_over(points, plane, config)
-        top = float(np.quantile(height, MOST[1]))
-    silhouette, limbs = silhouettes(frame, object_id)
-    facets = hull_facets(np.concatenate([seen, feet]))
+        top = float(np.quantile(height, config.most[1]))
+    silhouette, limbs = silhouettes(frame, object_id, config.radii)
+    facets = hull_facets(np.concatenate([seen, feet]), config.thickness)
     sight = seen.mean(axis=0)
     across = normalise(np.cross(up, sight))
     ahead = np.cross(across, up)
-    front, back = np.quantile(seen @ ahead, MOST)
-    left, right = np.quantile(seen @ across, MOST)
+    front, back = np.quantile(seen @ ahead, config.most)
+    left, right = np.quantile(seen @ across, config.most)
     return VisiblePart(
         frame=frame,
         object_id=object_id,
@@ -116,18 +111,19 @@ def visible_part(
         front=float(front),
         back=float(back),
         middle=float(left + right) / 2,
-        width=max(float(right - left), LEAST),
+        width=max(float(right - left), config.least),
         depths=-outside_hull(seen, facets),
-        normals=surface_normals(seen),
+        normals=surface_normals(seen, config.neighbours),
         silhouette=silhouette,
         limbs=limbs,
+        config=config,
     )
 
 
-def surface_normals(seen: Array) -> Array:
+def surface_normals(seen: Array, neighbours: int) -> Array:
     """Unit normals (n, 3), towards the camera, of points (n, 3), camera frame: the direction in
     which a point's neighbours vary least."""
-    count = min(NEIGHBOURS, len(seen))
+    count = min(neighbours, len(seen))
     _, rows = cKDTree(seen).query(seen, k=[*range(1, count + 1)])
     near = seen[rows] - seen[rows].mean(axis=1, keepdims=True)
     _, directions = np.linalg.eigh(np.einsum("nki,nkj->nij", near, near))

@@ -165,6 +165,7 @@ def result_record(result: Reconstruction, frame: str) -> dict[str, Any]:
         "objects": [_object_record(o, T_target_cam) for o in result.objects],
         "seconds": _rounded(result.seconds),
         "config": result.configuration,
+        "segmentation": result.segmentation,
         "versions": _versions(),
     }
 

@@ -27,6 +27,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.stats import chi2, norm
 
 from brrp_cli.config import SurfaceConfig
 from brrp_cli.inference.hypothesis_posterior import HypothesisPosterior
@@ -44,7 +45,8 @@ class ConfidenceSurface:
     """A closed, outward mesh that the object lies inside of with probability `confidence`.
 
     vertices : (n, 3) float64, metres, camera frame; faces : (m, 3) int64
-    level : t, the occupancy probability on it
+    level : t, the occupancy probability on it; around a recognised object's mesh, whose place and
+    not whose shape is in doubt, 1 - confidence
     bounded : false where the region reaches the end of what the posterior describes, so that
     the object may go on beyond it
     """
@@ -127,19 +129,29 @@ def _around_stored_mesh(
     """The same along the normals of a recognised object's mesh, which no grid makes coarser; None
     where the frame contradicts the stored shape."""
     through = along_normals(posterior, number, config)
-    if moved_to_level(through, config.level).off > config.most_off:
+    best = moved_to_level(through, config.level)
+    if best.off > config.most_off:
         return None
-    level = confidence_level(through.particles, confidence, posterior.shares)
-    if level is None:
-        return None
-    level = min(level, config.level)
-    vertices = moved_to_level(through, level).vertices
+    shape = placed(posterior, number)
+    # All placements that are as probable, at once (Scheffe's band): the pose has six unknowns.
+    by_pose = np.sqrt(chi2.ppf(confidence, 6)) * shape.deviations
+    band = np.hypot(by_pose, norm.ppf((1 + confidence) / 2) * config.fidelity)
+    # Where a vertex is a corner, its faces move by less than itself.
+    vertices = best.vertices + (band * shape.shape.corners)[:, None] * through.normals
+    if posterior.object_weight(number) < confidence:
+        # The object may be something else altogether.
+        level = confidence_level(through.particles, confidence, posterior.shares)
+        if level is None:
+            return None
+        other = moved_to_level(through, min(level, config.level)).vertices
+        outer = np.einsum("ni,ni->n", other - vertices, through.normals) > 0
+        vertices = np.where(outer[:, None], other, vertices)
     if margin > 0:
         grown = vertices + margin * through.normals
         may_grow = np.ones(len(grown), dtype=bool) if empty is None else ~empty(grown)
         vertices = np.where(may_grow[:, None], grown, vertices)
-    faces = placed(posterior, number).shape.faces.astype(np.int64)
-    return ConfidenceSurface(vertices, faces, confidence, level, bounded=True)
+    faces = shape.shape.faces.astype(np.int64)
+    return ConfidenceSurface(vertices, faces, confidence, 1 - confidence, bounded=True)
 
 
 def _at_edge(region: NDArray[np.bool_]) -> bool:

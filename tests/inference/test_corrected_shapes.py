@@ -53,12 +53,15 @@ def noisy(frame, seed=0):
     return replace(frame, points=points.astype(np.float32))
 
 
-def corrected(true, model, frame_of=noisy):
+WIDTH = MeanConfig().width
+
+
+def corrected(true, model, frame_of=noisy, width=WIDTH):
     """The posterior of a frame of the solid `true` under the one hypothesis that it is `model`,
     which stands where the solid does."""
     frame = frame_of(photograph({ID: in_camera(true, T)}))
     seen = observe(frame, ObservationConfig(), 0).objects[ID]
-    shape = at(model, T, width=MeanConfig().width)
+    shape = at(model, T, width=width)
     extent = np.concatenate([seen.points.astype(np.float64), shape.bounds])
     box = np.stack([extent.min(axis=0) - MAP.margin, extent.max(axis=0) + MAP.margin])
     noise = SENSOR.sure * depth_deviation(seen.center[2:], SENSOR)[0]
