@@ -24,10 +24,10 @@ def hypothesis(score, size=1.0):
 
 
 def placed_shape(score, size=1.0):
-    """Seen from all sides, without waves of the sensor."""
+    """Seen from all sides by a sensor with waves of half a millimetre."""
     one = hypothesis(score, size)
     seen = one.model.surface @ one.T_cam_model[:3, :3].T + one.T_cam_model[:3, 3]
-    return _placed_shape(one, seen.astype(np.float32), 0.0, CONFIG)
+    return _placed_shape(one, seen.astype(np.float32), 0.0005, CONFIG)
 
 
 @pytest.mark.parametrize("size", [1.0, 0.8])
