@@ -20,7 +20,8 @@ from brrp_cli.config import (
 from brrp_cli.geometry import transform_points
 from brrp_cli.inference.infer_hypotheses import Problem, SoftSamples, infer_correction
 from brrp_cli.observation.ray_samples import observe
-from brrp_cli.observation.soft_samples import depth_deviation, soft_samples
+from brrp_cli.observation.sensor_noise import depth_deviation
+from brrp_cli.observation.soft_samples import soft_samples
 from brrp_cli.raycast import inside
 from brrp_cli.shapes import solids
 from brrp_cli.surface.extract import extract_surface

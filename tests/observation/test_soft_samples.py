@@ -11,7 +11,8 @@ from brrp_cli.frames.frame import Frame
 from brrp_cli.frames.projection import depth_behind
 from brrp_cli.geometry import backproject
 from brrp_cli.observation.ray_samples import ObjectObservation
-from brrp_cli.observation.soft_samples import depth_deviation, soft_samples
+from brrp_cli.observation.sensor_noise import depth_deviation
+from brrp_cli.observation.soft_samples import soft_samples
 
 CONFIG = SensorConfig()
 K = np.array([[100.0, 0, 50], [0, 100, 40], [0, 0, 1]])

@@ -44,7 +44,7 @@ def at(
     limit: float = 5.0,
     field: FieldConfig = FIELD,
 ) -> PlacedShape:
-    """The hypothesis that a mesh, in metres, stands there."""
+    """The hypothesis that a mesh, in metres, stands there, in a pose that is known exactly."""
     shape, T_mesh_shape = stored(mesh, field)
     T = np.eye(4) if T_cam_mesh is None else T_cam_mesh
-    return PlacedShape(name, shape, T @ T_mesh_shape, width, limit)
+    return PlacedShape(name, shape, T @ T_mesh_shape, width, limit, np.zeros((6, 6)))

@@ -84,6 +84,11 @@ def around(mesh: trimesh.Trimesh) -> HypothesisPosterior:
     return posterior_on([logit], mesh.bounds + np.array([[-MARGIN], [MARGIN]]), which=(0, 0))
 
 
+def _retrieved(name: str, probability: float, size: float, **scores: float) -> Retrieved:
+    T = np.eye(4)
+    return Retrieved(name, probability, T, T_cam_mesh=T, size_factor=size, **scores)
+
+
 def write_made_result(folder: Path, *, frame: str = "camera") -> Path:
     """The box, the L, and a speck of four pixels without a mesh."""
     meshes = truth()
@@ -99,6 +104,7 @@ def write_made_result(folder: Path, *, frame: str = "camera") -> Path:
             OK,
             n_points=int((segmap == object_id).sum()),
             retrieved=[
+<<<<<<< HEAD
                 Retrieved(
                     "a <b>box</b> & more",
                     0.75,
@@ -115,6 +121,10 @@ def write_made_result(folder: Path, *, frame: str = "camera") -> Path:
                     alignment_score=0.2,
                     weight=0.0,
                 ),
+=======
+                _retrieved("a <b>box</b> & more", 0.75, 1.0, alignment_score=0.9, weight=0.97),
+                _retrieved("mug", 0.05, 0.9, alignment_score=0.2, weight=0.0),
+>>>>>>> coretests
             ],
             unknown_probability=0.2,
             unknown_weight=0.03,

@@ -127,7 +127,7 @@ def test_removed_objects_leave_the_prior_of_the_others(
     assert remove_objects(prior, ["ae", "aa", "bad"]).removed == SECOND
     assert prior_bytes(prior) == prior_bytes(places["prior_a"])
     before = prior_bytes(prior)
-    with pytest.raises(PriorError, match="did you mean a[dh]"):
+    with pytest.raises(PriorError, match=r"did you mean a[dh]"):
         remove_objects(prior, ["ax"])
     with pytest.raises(PriorError, match="without objects"):
         remove_objects(prior, FIRST)
