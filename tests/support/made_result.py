@@ -104,27 +104,8 @@ def write_made_result(folder: Path, *, frame: str = "camera") -> Path:
             OK,
             n_points=int((segmap == object_id).sum()),
             retrieved=[
-<<<<<<< HEAD
-                Retrieved(
-                    "a <b>box</b> & more",
-                    0.75,
-                    T_cam_mesh=np.eye(4),
-                    size_factor=1.0,
-                    alignment_score=0.9,
-                    weight=0.97,
-                ),
-                Retrieved(
-                    "mug",
-                    0.05,
-                    T_cam_mesh=np.eye(4),
-                    size_factor=0.9,
-                    alignment_score=0.2,
-                    weight=0.0,
-                ),
-=======
                 _retrieved("a <b>box</b> & more", 0.75, 1.0, alignment_score=0.9, weight=0.97),
                 _retrieved("mug", 0.05, 0.9, alignment_score=0.2, weight=0.0),
->>>>>>> coretests
             ],
             unknown_probability=0.2,
             unknown_weight=0.03,
