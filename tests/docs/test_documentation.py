@@ -25,10 +25,11 @@ from documentation import (
 from markdown.extensions.toc import slugify
 
 from brrp_cli.cli import main
+from brrp_cli.commands.method_options import OneOf
 
 REFERENCE = ROOT / "docs" / "commands.md"
 PLACEHOLDER = re.compile(r"^(COMMAND|NAME|[A-Z]+|\.\.\.)$")
-CHECKED_TYPES = (click.Choice, click.IntRange, click.FloatRange)
+CHECKED_TYPES = (click.Choice, click.IntRange, click.FloatRange, OneOf)
 
 
 def all_commands(
