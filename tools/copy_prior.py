@@ -2,14 +2,14 @@
 
     python tools/copy_prior.py --prior prior/ --objects 50000 -o many/
 
-The objects of `prior` stay as they are. Copies have names and entries in the manifest of their own,
-lie in the shards in which a build would put them, so that `brrp prior add` can be timed too, and
-have descriptors that are mixed in pairs and stretched, so that no two are alike; all else of a
-copy is what its original has, to the byte. With --strange the histograms are shuffled besides, so that next
-to none of the copies is retrieved. Only manifest and descriptors take room on the disk: in a shard,
-every name of a copy is a hard link to its original, and so are shards of the same originals, which
-hold the names of all their copies. That is the one difference from a built prior, and `brrp verify`
-tells of it.
+The objects of `prior` stay as they are. Copies have names and entries in the manifest of their
+own, lie in the shards in which a build would put them, so that `brrp prior add` can be timed too,
+and have descriptors that are mixed in pairs and stretched, so that no two are alike; all else of
+a copy is what its original has, to the byte. With --strange the histograms are shuffled besides,
+so that next to none of the copies is retrieved. Only manifest and descriptors take room on the
+disk: in a shard, every name of a copy is a hard link to its original, and so are shards of the
+same originals, which hold the names of all their copies. That is the one difference from a built
+prior, and `brrp verify` tells of it.
 """
 
 from __future__ import annotations
