@@ -2,19 +2,21 @@
 
     python tools/copy_prior.py --prior prior/ --objects 50000 -o many/
 
-The objects of `prior` stay as they are. Copies have names, entries in the manifest and shards of
-their own, and descriptors that are mixed in pairs and stretched, so that no two are alike; all else
-of a copy is what its original has, to the byte. With --strange the histograms are shuffled besides,
+The objects of `prior` stay as they are. Copies have names and entries in the manifest of their
+own, lie in the shards in which a build would put them, so that `brrp prior add` can be timed too,
+and have descriptors that are mixed in pairs and stretched, so that no two are alike; all else of
+a copy is what its original has, to the byte. With --strange the histograms are shuffled besides,
 so that next to none of the copies is retrieved. Only manifest and descriptors take room on the
-disk: in a shard, every name of a copy is a hard link to its original, and so are shards with the
-same content. That is the one difference from a built prior, and `brrp verify` tells of it.
+disk: in a shard, every name of a copy is a hard link to its original, and so are shards of the
+same originals, which hold the names of all their copies. That is the one difference from a built
+prior, and `brrp verify` tells of it.
 """
 
 from __future__ import annotations
 
 import os
-import shutil
 import sys
+from collections import defaultdict
 from collections.abc import Iterator
 from dataclasses import replace
 from itertools import islice
@@ -32,7 +34,7 @@ from brrp_cli.errors import BrrpError, PriorError
 from brrp_cli.files import atomic_folder, sha256_file
 from brrp_cli.prior.appearance_file import sidecar_file
 from brrp_cli.prior.appearance_index import open_appearance_index
-from brrp_cli.prior.build.shard_plan import MEAN_OBJECTS, shard_file
+from brrp_cli.prior.build.shard_plan import plan_shards, shard_file
 from brrp_cli.prior.index import read_index
 from brrp_cli.prior.manifest import (
     FILE,
@@ -75,11 +77,9 @@ def copy_prior(prior: Prior, count: int, folder: Path, strange: bool) -> None:
     """Write all of it into an empty folder."""
     manifest = prior.manifest
     (folder / "shards").mkdir()
-    for shard in manifest.shards:
-        shutil.copyfile(prior.path / shard.file, folder / shard.file)
-    copies = list(islice(_copies(manifest.objects), count - len(manifest.objects)))
-    placed, shards = _place(copies, prior, folder)
-    objects = sorted([*manifest.objects, *placed], key=lambda entry: entry.name)
+    copies = islice(_copies(manifest.objects), count - len(manifest.objects))
+    pairs = [*((entry, entry) for entry in manifest.objects), *copies]
+    objects, shards = _place(sorted(pairs, key=lambda pair: pair[0].name), prior, folder)
     rows = {name: row for row, name in enumerate(prior.names)}
     file = sidecar_file(objects, prior.parameters)
     write_rows(
@@ -95,7 +95,7 @@ def copy_prior(prior: Prior, count: int, folder: Path, strange: bool) -> None:
         replace(
             manifest,
             objects=objects,
-            shards=sorted([*manifest.shards, *shards], key=lambda entry: entry.file),
+            shards=sorted(shards, key=lambda entry: entry.file),
             appearance=ShardEntry(file, sha256_file(path), path.stat().st_size),
         ),
     )
@@ -113,30 +113,44 @@ def _copies(objects: list[ObjectEntry]) -> Iterator[tuple[ObjectEntry, ObjectEnt
 
 
 def _place(
-    copies: list[tuple[ObjectEntry, ObjectEntry]], prior: Prior, folder: Path
+    pairs: list[tuple[ObjectEntry, ObjectEntry]], prior: Prior, folder: Path
 ) -> tuple[list[ObjectEntry], list[ShardEntry]]:
-    """The copies, each in a shard, about 8 to a shard, and those shards."""
+    """(object, original), sorted, each in its shard, and those shards."""
+    names_of: defaultdict[str, list[str]] = defaultdict(list)
+    for item, original in pairs:
+        names_of[original.name].append(item.name)
+    by_name = {item.name: (item, original) for item, original in pairs}
+    groups: defaultdict[tuple[str, ...], list[list[ObjectEntry]]] = defaultdict(list)
+    for names in plan_shards(list(by_name)):
+        originals = sorted({by_name[name][1].name for name in names})
+        groups[tuple(originals)].append([by_name[name][0] for name in names])
+    placed, shards = [], []
+    for originals, members in groups.items():
+        base = folder / "shards" / "base.h5"
+        _write_base(base, [(prior.entries[name], names_of[name]) for name in originals], prior)
+        sha256, size = sha256_file(base), base.stat().st_size
+        for run in members:
+            file = shard_file(prior.parameters, [(item.name, item.input_sha256) for item in run])
+            os.link(base, folder / file)
+            shards.append(ShardEntry(file, sha256, size))
+            placed += [replace(item, shard=file) for item in run]
+        base.unlink()
+    return sorted(placed, key=lambda entry: entry.name), shards
+
+
+def _write_base(path: Path, contents: list[tuple[ObjectEntry, list[str]]], prior: Prior) -> None:
+    """A shard of these objects, each under each of its names."""
     import h5py
 
-    placed, shards = [], []
-    for shard in prior.manifest.shards:
-        members = [pair for pair in copies if pair[1].shard == shard.file]
-        if not members:
-            continue
-        base = folder / "shards" / "base.h5"
-        shutil.copyfile(prior.path / shard.file, base)
-        with h5py.File(base, "r+") as file:
-            for copy, original in members:
-                file[f"objects/{copy.name}"] = file[f"objects/{original.name}"]
-        sha256, size = sha256_file(base), base.stat().st_size
-        for start in range(0, len(members), MEAN_OBJECTS):
-            run = [copy for copy, _ in members[start : start + MEAN_OBJECTS]]
-            name = shard_file(prior.parameters, [(c.name, c.input_sha256) for c in run])
-            os.link(base, folder / name)
-            shards.append(ShardEntry(name, sha256, size))
-            placed += [replace(copy, shard=name) for copy in run]
-        base.unlink()
-    return placed, shards
+    with h5py.File(path, "w") as base:
+        group = base.create_group("objects")
+        for entry, names in contents:
+            with h5py.File(prior.path / entry.shard) as source:
+                base.attrs.update(source.attrs)
+                source.copy(f"objects/{entry.name}", group)
+            for name in names:
+                if name != entry.name:
+                    group[name] = group[entry.name]
 
 
 def write_rows(

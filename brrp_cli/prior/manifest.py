@@ -12,7 +12,7 @@ from __future__ import annotations
 import hashlib
 import json
 import re
-from dataclasses import asdict, astuple, dataclass
+from dataclasses import astuple, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -85,10 +85,10 @@ class Manifest:
                 "schema": SCHEMA,
                 "parameters": self.parameters,
                 "libraries": self.libraries,
-                "objects": [asdict(entry) for entry in self.objects],
-                "shards": [asdict(entry) for entry in self.shards],
-                "failed": [asdict(entry) for entry in self.failed],
-                "appearance": asdict(self.appearance),
+                "objects": [vars(entry) for entry in self.objects],
+                "shards": [vars(entry) for entry in self.shards],
+                "failed": [vars(entry) for entry in self.failed],
+                "appearance": vars(self.appearance),
             }
         )
 
@@ -111,8 +111,11 @@ def with_own_sum(table: dict[str, Any]) -> bytes:
 
 
 def write_manifest(folder: Path, manifest: Manifest) -> None:
-    """Commit."""
-    write_bytes(folder / FILE, manifest.as_bytes())
+    """Commit, unless just this manifest stands there already."""
+    data = manifest.as_bytes()
+    path = folder / FILE
+    if not (path.is_file() and path.stat().st_size == len(data) and path.read_bytes() == data):
+        write_bytes(path, data)
 
 
 def read_manifest(folder: Path) -> Manifest:

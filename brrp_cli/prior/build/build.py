@@ -247,8 +247,7 @@ class Run:
     def commit(self, phrases: dict[str, str], before: Manifest | None) -> BuildReport:
         """Write the manifest of all that stands now, and delete what is no longer needed."""
         manifest = self._manifest(phrases, before)
-        if before is None or before.as_bytes() != manifest.as_bytes():
-            write_manifest(self.out, manifest)
+        write_manifest(self.out, manifest)
         # Now, so that not the first to open the prior pays for it.
         open_appearance_index(self.out, read_index(self.out), lambda: manifest)
         _sweep(self.out, manifest)

@@ -22,7 +22,7 @@ from brrp_cli.prior.build.build import (
 from brrp_cli.prior.build.descriptions import describe, read_descriptions
 from brrp_cli.prior.build.find_meshes import find_all_meshes
 from brrp_cli.prior.build.reuse import Finished, Reusable, unlisted_objects
-from brrp_cli.prior.manifest import FILE, Manifest, ObjectEntry, read_manifest
+from brrp_cli.prior.manifest import FILE, Manifest, ObjectEntry, read_bytes, read_manifest
 from brrp_cli.prior.parameters import differences, restore_parameters
 from brrp_cli.prior.shard import damaged
 from brrp_cli.threads import cores
@@ -45,7 +45,8 @@ def add_objects(
     """
     sources = {source.name: source for source in find_all_meshes(meshes)}
     phrases = describe(sources, read_descriptions(descriptions) if descriptions else {})
-    read_manifest(prior)
+    # No folder is made, and no lock, where there is no prior.
+    read_bytes(prior)
     with sole_builder(prior):
         before = read_manifest(prior)
         parameters = restore_parameters(before.parameters, prior / FILE)
@@ -65,7 +66,7 @@ def add_objects(
 def remove_objects(prior: Path, names: Iterable[str]) -> BuildReport:
     """Remove objects by name; a mesh that failed is told no more. Errors: PriorError for a name
     that is not there, or where none would be left; OutputError."""
-    read_manifest(prior)
+    read_bytes(prior)
     with sole_builder(prior):
         before = read_manifest(prior)
         gone = set(names)

@@ -18,7 +18,7 @@ from brrp_cli.prior.build.shard_plan import plan_shards
 from brrp_cli.prior.parameters import BuildParameters, restore_parameters
 from brrp_cli.prior.store import open_prior, verify_prior
 
-# "ad" has a shard of its own; "aa" stands before it in that shard; the others share one.
+# Names are cut after "ad" and after "ah": each folder changes both shards of the other.
 FIRST, SECOND = ["ad", "ah"], ["aa", "ae"]
 
 
@@ -127,7 +127,7 @@ def test_removed_objects_leave_the_prior_of_the_others(
     assert remove_objects(prior, ["ae", "aa", "bad"]).removed == SECOND
     assert prior_bytes(prior) == prior_bytes(places["prior_a"])
     before = prior_bytes(prior)
-    with pytest.raises(PriorError, match=r"did you mean a[dh]"):
+    with pytest.raises(PriorError, match="no such object"):
         remove_objects(prior, ["ax"])
     with pytest.raises(PriorError, match="without objects"):
         remove_objects(prior, FIRST)
