@@ -2,7 +2,7 @@
 
     python tools/draw_sensors.py RealSense=REAL/sugar_box stereo=SCENES/00000000/0000 ... -o PNG
 
-Each frame is a real one (color.png, depth.png) or a view of a made scene. A row for each: colour,
+Each frame is a real one (color.png, depth.png) or a view of a made scene, and gives a row: colour,
 depth, and what depth deviates from the table's plane (red nearer than the plane, blue farther, full
 colour at 8 mm, grey for what stands on it). Black has no return.
 """
@@ -27,7 +27,7 @@ from brrp_cli.frames.published import read_published
 
 FULL = 0.008  # metres of deviation at full colour
 OFF_TABLE = 0.02  # metres
-SIZE = (400, 300)
+SIZE = (320, 240)
 
 
 def row(frame: Frame, name: str) -> NDArray[np.uint8]:
