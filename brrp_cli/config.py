@@ -211,8 +211,9 @@ class MeanConfig:
     `sure` widens it by `doubt` metres for each unit. An object that none explains is completed on a
     grid of about `nodes` nodes by a network, which is evaluated at every node where the coarse ones
     around are not all `beyond_doubt`; its logit is `shell_logit` at least for `shell` metres behind
-    what is seen of it. Space is empty that lies more than `carve_depth` in front of the measured
-    depth, or `carve_plane` below the plane, or less than `carve_behind` behind what is no object's
+    what is seen of it, and for `shell_nodes` of the grid's spacings where these are longer. Space
+    is empty that lies more than `carve_depth` in front of the measured depth, or `carve_plane`
+    below the plane, or less than `carve_behind` behind what is no object's
     and more than `carve_pixels` from the mask.
     """
 
@@ -222,8 +223,9 @@ class MeanConfig:
     doubt: float = 0.01
     limit: float = 5.0
     beyond_doubt: float = 1.5
-    shell: float = 0.006
-    shell_logit: float = 1.0
+    shell: float = 0.004
+    shell_nodes: float = 1.3
+    shell_logit: float = 2.0
     carve_depth: float = 0.006
     carve_plane: float = 0.004
     carve_behind: float = 0.01
