@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from brrp_cli.frames.build import make_frame as make_frame
     from brrp_cli.frames.npz import load_frame as load_frame
     from brrp_cli.frames.readers import read_frame as read_frame
+    from brrp_cli.methods.config_file import load_config as load_config
     from brrp_cli.methods.posterior_file import open_posterior as open_posterior
     from brrp_cli.prior.store import open_prior as open_prior
     from brrp_cli.reconstruction import Reconstruction as Reconstruction
@@ -31,6 +32,7 @@ _HOMES = {
     "BrrpError": "brrp_cli.errors",
     "Reconstruction": "brrp_cli.reconstruction",
     "Reconstructor": "brrp_cli.session",
+    "load_config": "brrp_cli.methods.config_file",
     "load_frame": "brrp_cli.frames.npz",
     "make_frame": "brrp_cli.frames.build",
     "open_posterior": "brrp_cli.methods.posterior_file",

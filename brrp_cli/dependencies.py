@@ -28,7 +28,7 @@ _FIXES = {
     "libgomp": _SYSTEM_PACKAGES,
 }
 # Packages that are not called what they are imported as.
-_PACKAGES = {"rerun": "rerun-sdk"}
+_PACKAGES = {"rerun": "rerun-sdk", "cv2": "opencv-python-headless"}
 # Without libOpenGL pymeshlab imports, prints a page of warnings and lacks half of its filters.
 _NEEDS = {"pymeshlab": ("libGL.so.1", "libOpenGL.so.0")} if sys.platform == "linux" else {}
 

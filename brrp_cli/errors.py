@@ -2,10 +2,12 @@
 
 Every failure that a user can cause or mend is a `BrrpError`. It says what went wrong, where, what
 was expected, what was found and how to mend it. Commands print it as one message without a
-traceback; any other exception that reaches the user is a bug of ours.
+traceback; any other exception is a bug, of which --verbose shows the traceback.
 """
 
 from __future__ import annotations
+
+import traceback
 
 
 class BrrpError(Exception):
@@ -59,6 +61,21 @@ def _rebuild(
     fix: str | None,
 ) -> BrrpError:
     return kind(what, where=where, expected=expected, found=found, fix=fix)
+
+
+def unexpected(error: BaseException) -> BrrpError:
+    """What people are told of an exception that is a bug of ours, or of a library."""
+    last = traceback.extract_tb(error.__traceback__)[-1:]
+    return BrrpError(
+        "An error that brrp does not know",
+        where=next((f"{frame.filename}:{frame.lineno}, {frame.name}" for frame in last), None),
+        found=repr(error),
+        fix="run again with --verbose, which shows the traceback, and send it to us",
+    )
+
+
+class ConfigError(BrrpError):
+    """A configuration file has a key or a value that means nothing."""
 
 
 class FrameError(BrrpError):

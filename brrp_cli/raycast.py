@@ -21,10 +21,10 @@ if TYPE_CHECKING:
 RAYS = 11
 
 
-def raycasting_scene(meshes: Sequence[trimesh.Trimesh]) -> Any:
-    """An Open3D RaycastingScene in which mesh i has geometry id i."""
+def raycasting_scene(meshes: Sequence[trimesh.Trimesh], threads: int = 0) -> Any:
+    """An Open3D RaycastingScene in which mesh i has geometry id i. threads : 0 = all cores."""
     o3d = import_open3d()
-    scene = o3d.t.geometry.RaycastingScene()
+    scene = o3d.t.geometry.RaycastingScene(nthreads=threads)
     for mesh in meshes:
         scene.add_triangles(
             o3d.core.Tensor(np.array(mesh.vertices, dtype=np.float32)),

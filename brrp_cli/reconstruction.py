@@ -105,15 +105,19 @@ class Retrieved:
     """One stored object that was retrieved for one seen object.
 
     T_cam_object maps the stored object's normalised coordinates to the camera frame (a
-    similarity); None where registration found no inlier. fitness: share of observed points with
-    an inlier, 0 to 1. alignment_score : what the frame says for the best placement, 1 at best;
-    weight : of the object in the posterior; both None where placements are not verified.
+    similarity); T_cam_mesh : (4, 4) rigid, metres, from the object's own mesh file, multiplied by
+    size_factor, to the camera frame: x_cam = T_cam_mesh (size_factor * x_mesh). All three are None
+    where registration found no inlier.
+    inliers, fitness : of the paper's registration: pairs, and their share of the stored cloud
+    alignment_score : what the frame says for the best placement, 1 at best; weight : of the object
+    in the posterior; both None where placements are not verified.
     """
 
     name: str
     probability: float
     T_cam_object: NDArray[np.float64] | None = None
-    scale: float | None = None
+    T_cam_mesh: NDArray[np.float64] | None = None
+    size_factor: float | None = None
     inliers: int = 0
     fitness: float = 0.0
     alignment_score: float | None = None
@@ -149,6 +153,13 @@ class ObjectReconstruction:
     surface: Surface | None = None
     seconds: dict[str, float] = field(default_factory=dict)
 
+    @property
+    def recognised(self) -> Retrieved | None:
+        """The stored object that this one was taken for: the one that weighs more than a half; None
+        where none does, or where placements are not verified."""
+        heavy = [r for r in self.retrieved if r.weight is not None and r.weight > 0.5]
+        return heavy[0] if heavy else None
+
 
 @dataclass(frozen=True)
 class Reconstruction:
@@ -157,6 +168,7 @@ class Reconstruction:
     objects : one for each id in the mask, ascending; plane : the support plane, camera frame;
     retriever, prior_path, prior_digest : None where the method has no prior
     configuration : what decided the result, plain JSON
+    segmentation : the same of the masks, where they were made on the way; else None
     seconds : time of the stages that concern the whole frame.
     """
 
@@ -171,6 +183,7 @@ class Reconstruction:
     seed: int
     device: str
     seconds: dict[str, float] = field(default_factory=dict)
+    segmentation: dict[str, Any] | None = None
 
     @property
     def reconstructed(self) -> list[ObjectReconstruction]:

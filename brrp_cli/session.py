@@ -10,11 +10,12 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterable, Iterator
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
 from brrp_cli.api import reconstruct
+from brrp_cli.config.segmentation import SegmentConfig
 from brrp_cli.errors import FrameError
 from brrp_cli.frames.frame import Frame
 from brrp_cli.methods.configuration import MethodConfig
@@ -34,7 +35,7 @@ class Reconstructor:
     config, weights, seed, device, workers : as in `reconstruct`
     retriever : a name as `brrp reconstruct --retriever` takes it
     prompt : makes masks of what it names where a frame has none; None = of what stands on the
-        table, without a model
+        table, without a model; segmentation : the numbers of both
 
     The same frame and seed give the same result as a process of its own. Errors: BrrpError.
     """
@@ -50,6 +51,7 @@ class Reconstructor:
         clip_dir: Path | None = None,
         prompt: str | None = None,
         masks_dir: Path | None = None,
+        segmentation: SegmentConfig | None = None,
         seed: int = 0,
         device: str = "auto",
         workers: int | None = None,
@@ -67,11 +69,12 @@ class Reconstructor:
             self._retriever = choose_retriever(
                 retriever, self._prior, self._config, seed, clip_dir=clip_dir
             )
+        self._segmentation = segmentation or SegmentConfig()
         self._segmenter: PromptSegmenter | None = None
         if prompt is not None:
             from brrp_cli.segmentation.prompted.segment_by_prompt import PromptSegmenter
 
-            self._segmenter = PromptSegmenter(masks_dir)
+            self._segmenter = PromptSegmenter(masks_dir, self._segmentation)
 
     def __call__(self, frame: Frame) -> Reconstruction:
         """All objects of one frame; masks are made where it has none, which `seconds` tells.
@@ -93,7 +96,9 @@ class Reconstructor:
             workers=self._workers,
         )
         result.seconds["masks"] = seconds
-        return result
+        if masked is frame:
+            return result
+        return replace(result, segmentation=asdict(self._segmentation))
 
     def stream(self, frames: Iterable[Frame]) -> Iterator[Reconstruction | FrameError]:
         """One answer for each frame: a frame that cannot be used gives its error and ends
@@ -109,4 +114,4 @@ class Reconstructor:
 
         if self._segmenter is not None and self._prompt is not None:
             return replace(frame, segmap=self._segmenter(frame, self._prompt, self._seed))
-        return replace(frame, segmap=segment(frame, self._seed))
+        return replace(frame, segmap=segment(frame, self._seed, self._segmentation))

@@ -17,7 +17,8 @@ def no_clip_of_the_users(tmp_path_factory: pytest.TempPathFactory):
 @pytest.fixture(autouse=True)
 def log_level_is_restored():
     """A command that is run in this process sets the level, as with `--quiet`, for good."""
-    root = logging.getLogger()
-    level = root.level
+    loggers = [logging.getLogger(), logging.getLogger("brrp_cli")]
+    levels = [logger.level for logger in loggers]
     yield
-    root.setLevel(level)
+    for logger, level in zip(loggers, levels, strict=True):
+        logger.setLevel(level)

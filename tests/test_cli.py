@@ -1,14 +1,17 @@
 import json
+import logging
 import re
 import subprocess
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import click
 import pytest
 from click.testing import CliRunner
 
-from brrp_cli.cli import COMMANDS, LazyGroup, main
+from brrp_cli.cli import COMMANDS, LazyGroup, main, volume_options, with_volume
 from brrp_cli.errors import BrrpError
 from brrp_cli.version import __version__
 
@@ -61,7 +64,8 @@ def test_version_of_the_installed_module() -> None:
 def test_an_unknown_command_is_a_usage_error() -> None:
     done = CliRunner().invoke(main, ["recontsruct"])
     assert done.exit_code == 2
-    assert "No such command 'recontsruct'" in done.stderr
+    assert "No such command 'recontsruct'. Did you mean 'reconstruct'?" in done.stderr
+    assert "Did you mean" not in CliRunner().invoke(main, ["xyz"]).stderr
 
 
 class Failing(LazyGroup):
@@ -71,15 +75,28 @@ class Failing(LazyGroup):
 
     def get_command(self, ctx: click.Context, name: str) -> click.Command:
         def fail() -> None:
+            logging.getLogger("brrp_cli.tests").debug("on the way")
             raise self.error
 
-        return click.Command(name, callback=fail)
+        return with_volume(click.Command(name, callback=fail))
 
 
-def fail_with(error: Exception) -> click.testing.Result:
-    group = Failing("brrp")
+def fail_with(error: Exception, *arguments: str) -> click.testing.Result:
+    group = Failing("brrp", params=volume_options())
     group.error = error
-    return CliRunner().invoke(group, ["anything"])
+    with stderr_log():
+        return CliRunner().invoke(group, arguments or ["anything"])
+
+
+@contextmanager
+def stderr_log() -> Iterator[None]:
+    """Handlers of the log that a process of its own would have: none yet."""
+    root = logging.getLogger()
+    before, root.handlers = root.handlers, []
+    try:
+        yield
+    finally:
+        root.handlers = before
 
 
 def test_a_brrp_error_is_one_message_without_traceback() -> None:
@@ -99,9 +116,29 @@ def test_a_brrp_error_brings_its_exit_code() -> None:
     assert fail_with(error).exit_code == 3
 
 
-def test_any_other_exception_is_a_bug_and_keeps_its_traceback() -> None:
+def test_any_other_exception_is_told_and_says_how_to_see_its_traceback() -> None:
     done = fail_with(ZeroDivisionError("ours"))
-    assert isinstance(done.exception, ZeroDivisionError)
+    assert done.exit_code == 1 and "Traceback" not in done.stderr
+    assert "found:    ZeroDivisionError('ours')" in done.stderr
+    assert "test_cli.py" in done.stderr and "run again with --verbose" in done.stderr
+
+
+@pytest.mark.parametrize("arguments", [["-v", "anything"], ["anything", "--verbose"]])
+def test_verbose_shows_the_traceback_and_the_log(arguments: list[str]) -> None:
+    done = fail_with(ZeroDivisionError("ours"), *arguments)
+    assert done.exit_code == 1
+    assert "Traceback (most recent call last)" in done.stderr
+    assert "DEBUG brrp_cli.tests: on the way" in done.stderr
+    assert "DEBUG" not in fail_with(ZeroDivisionError("ours")).stderr
+
+
+def test_mistyped_options_are_told_with_the_one_that_was_meant() -> None:
+    done = CliRunner().invoke(main, ["info", "--jsn"])
+    assert done.exit_code == 2 and "--json" in done.stderr
+
+
+def test_version_is_short_too() -> None:
+    assert CliRunner().invoke(main, ["-V"]).output == f"brrp, version {__version__}\n"
 
 
 def test_quiet_leaves_results_and_errors_alone(tmp_path: Path) -> None:
@@ -111,8 +148,11 @@ def test_quiet_leaves_results_and_errors_alone(tmp_path: Path) -> None:
     arguments = ["build-prior", str(tmp_path), "--samples", "100", "-o"]
     loud = CliRunner().invoke(main, [*arguments, str(tmp_path / "loud")])
     quiet = CliRunner().invoke(main, ["-q", *arguments, str(tmp_path / "quiet")])
+    after = CliRunner().invoke(main, [*arguments, str(tmp_path / "after"), "--quiet"])
+    both = CliRunner().invoke(main, ["-q", *arguments, str(tmp_path / "both"), "-v"])
+    assert both.exit_code == 2 and "exclude each other" in both.stderr
     assert "Prior:" in loud.stderr
-    assert quiet.stderr == ""
+    assert quiet.stderr == after.stderr == ""
     assert quiet.stdout.startswith("1 objects (1 made")
     failed = CliRunner().invoke(main, ["-q", "info", str(tmp_path / "nothing")])
     assert failed.exit_code == 1 and "Error:" in failed.stderr

@@ -55,3 +55,13 @@ def test_closing_early_leaves_no_process() -> None:
     results.close()
     assert not multiprocessing.active_children()
     assert dict(os.environ) == before
+
+
+def test_a_worker_that_is_killed_while_it_has_nothing_to_do_costs_no_task() -> None:
+    results = run_tasks(act, [("a",), ("b",), ("c",)], workers=1, time_limit=60.0)
+    assert next(results) == (0, "A")
+    for child in multiprocessing.active_children():
+        child.kill()
+        child.join()
+    time.sleep(0.5)
+    assert list(results) == [(1, "B"), (2, "C")]

@@ -228,7 +228,7 @@ def measure_growth(frame: Frame, prior: Prior, options: Options, quick: bool) ->
 
 
 def _starter() -> Path:
-    from brrp_cli.prior.build.build.starter import starter_prior
+    from brrp_cli.prior.build.starter import starter_prior
 
     return starter_prior()
 

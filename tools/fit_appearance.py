@@ -5,8 +5,8 @@
 
 Scenes of objects that the prior holds and of others, made with `tools/make_scenes.py --noise
 structured-light --light varied`; every view counts. What is minimised is the mean of -ln P(what it
-is | R), where what is not in the prior is one more class. Printed are the values for WEIGHTS in
-brrp_cli/retrieval/score_fusion.py, and what becomes of each set.
+is | R), where what is not in the prior is one more class. Printed are the values for
+FusionConfig in brrp_cli/config/retrieval.py, and what becomes of each set.
 """
 
 from __future__ import annotations
@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from brrp_cli.config import preset
+from brrp_cli.config.retrieval import FusionConfig, IlluminantsConfig
 from brrp_cli.errors import BrrpError
 from brrp_cli.evaluation.calibration import expected_calibration_error
 from brrp_cli.ground_truth.scenes import find_scenes
@@ -32,7 +33,7 @@ from brrp_cli.progress import progress
 from brrp_cli.retrieval.appearance import AppearanceRetriever
 from brrp_cli.retrieval.base import unknown
 from brrp_cli.retrieval.illuminants import lights, local_lights, log_prior
-from brrp_cli.retrieval.score_fusion import WEIGHTS, Similarity, Weights, believe
+from brrp_cli.retrieval.score_fusion import Similarity, believe
 
 LARGE = 500  # visible pixels
 
@@ -59,7 +60,7 @@ def main(prior_path: Path, report: bool, sets: tuple[Path, ...]) -> None:
     except BrrpError as error:
         raise click.ClickException(str(error)) from error
     count = len(prior.names)
-    weights = WEIGHTS if report else fit(views, count)
+    weights = FusionConfig() if report else fit(views, count)
     click.echo(f"{weights}, mean loss {loss(views, weights, count):.4f}")
     click.echo(f"calibration error over all of them {calibration(views, weights, count):.3f}")
     for folder in sets:
@@ -88,24 +89,26 @@ def look(prior: Prior, folder: Path) -> list[View]:
     return views
 
 
-def fit(views: Sequence[View], count: int) -> Weights:
+def fit(views: Sequence[View], count: int) -> FusionConfig:
     """The weights with the least loss. All of them are positive."""
     from scipy.optimize import minimize
 
     found = minimize(
-        lambda x: loss(views, Weights(*np.exp(x)), count),
-        np.log(astuple(WEIGHTS)),
+        lambda x: loss(views, FusionConfig(*np.exp(x)), count),
+        np.log(astuple(FusionConfig())),
         method="Nelder-Mead",
         options={"xatol": 1e-2, "fatol": 1e-4, "maxfev": 150},
     )
-    return Weights(*(round(float(value), 2) for value in np.exp(found.x)))
+    return FusionConfig(*(round(float(value), 2) for value in np.exp(found.x)))
 
 
 def answers(
-    views: Sequence[View], weights: Weights, count: int
+    views: Sequence[View], weights: FusionConfig, count: int
 ) -> list[tuple[int, int, NDArray[np.float64]]]:
     """(true row, pixels, P(c|R)) of every object."""
-    light, local = log_prior(lights()), local_lights(lights())
+    lit = IlluminantsConfig()
+    gains = lights(lit)
+    light, local = log_prior(gains, lit), local_lights(gains, lit)
     return [
         (truth, pixels, probabilities)
         for view in views
@@ -118,7 +121,7 @@ def answers(
     ]
 
 
-def loss(views: Sequence[View], weights: Weights, count: int) -> float:
+def loss(views: Sequence[View], weights: FusionConfig, count: int) -> float:
     """Mean of -ln P(what it is | R)."""
     found = [
         max(p[truth] if truth >= 0 else unknown(p), 1e-12)
@@ -127,7 +130,7 @@ def loss(views: Sequence[View], weights: Weights, count: int) -> float:
     return float(-np.mean(np.log(found)))
 
 
-def calibration(views: Sequence[View], weights: Weights, count: int) -> float:
+def calibration(views: Sequence[View], weights: FusionConfig, count: int) -> float:
     """Expected calibration error of the most probable of the prior's objects and of none."""
     sure, right = [], []
     for truth, _, p in answers(views, weights, count):
@@ -137,7 +140,7 @@ def calibration(views: Sequence[View], weights: Weights, count: int) -> float:
     return expected_calibration_error(np.array(sure), np.array(right))
 
 
-def line(name: str, views: Sequence[View], weights: Weights, count: int, large: bool) -> str:
+def line(name: str, views: Sequence[View], weights: FusionConfig, count: int, large: bool) -> str:
     """Hit rates of one set, and how sure it is that the prior does not hold the object."""
     found = [
         (truth, p)

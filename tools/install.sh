@@ -3,7 +3,7 @@
 #
 #   bash tools/install.sh [FOLDER [EXTRA]]     FOLDER: .venv; EXTRA: "dev" adds what the tests need
 #
-# Needs Python 3.11 or newer (PYTHON=... names one). Open3D and pymeshlab need four system libraries
+# Needs Python 3.11 or 3.12 (PYTHON=... names one). Open3D and pymeshlab need four system libraries
 # (X11, GL, OpenGL, OpenMP), also where nothing is ever shown on a screen: those that the machine
 # lacks are installed with apt-get, and named first.
 set -euo pipefail
@@ -18,13 +18,13 @@ fail() {
 }
 
 python=""
-for candidate in ${PYTHON:-python3.11 python3}; do
-    if "$candidate" -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null; then
+for candidate in ${PYTHON:-python3.11 python3.12 python3}; do
+    if "$candidate" -c 'import sys; sys.exit(not (3, 11) <= sys.version_info < (3, 13))' 2>/dev/null; then
         python="$candidate"
         break
     fi
 done
-[ -n "$python" ] || fail "Python 3.11 or newer was not found (tried: ${PYTHON:-python3.11 python3})" \
+[ -n "$python" ] || fail "Python 3.11 or 3.12 was not found (tried: ${PYTHON:-python3.11 python3.12 python3})" \
     "sudo apt-get install python3.11 python3.11-venv, or PYTHON=/path/to/python bash $0"
 
 missing=()

@@ -14,6 +14,8 @@ The three sets of docs/accuracy.md, and the same scenes as a structured-light ca
     python tools/make_scenes.py --meshes random_shapes --scenes 20 -o scenes/other
 
 and each with `--noise structured-light -o scenes/..._noise`. Sets to tune on: `--seed 1000`.
+`--sensor stereo`, `xtion` or `kinect-azure` shows them as such a camera would, with its waves,
+bleeding silhouettes, steps and holes (docs/sensors.md); it takes the place of `--noise`.
 `--light varied` draws colour and brightness of the light, gamma and pixel noise for each scene;
 what stands where stays as it is.
 
@@ -37,10 +39,10 @@ from tqdm import tqdm
 # The script also runs from a checkout that is not installed.
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from tabletop.check import MIN_PIXELS, Distance, check_scene
+from tabletop.check import MIN_PIXELS, Distance
 from tabletop.held_out import LEAVE, MIXED, TAKE, chosen
 from tabletop.models import find_meshes
-from tabletop.scene import LIGHTS, LIMITS, Plan, make_scene
+from tabletop.scene import LIGHTS, LIMITS, SENSOR_NAMES, Plan, check_depth, make_scene
 
 from brrp_cli.dependencies import import_library
 from brrp_cli.errors import BrrpError, SceneError
@@ -79,6 +81,7 @@ def _size(_context: click.Context, _option: click.Parameter, value: str) -> tupl
 @click.option("--views", default=2, show_default=True, type=click.IntRange(1))
 @click.option("--seed", default=0, show_default=True)
 @click.option("--noise", default="none", show_default=True, type=click.Choice(list(LIMITS)))
+@click.option("--sensor", default="none", show_default=True, type=click.Choice(SENSOR_NAMES))
 @click.option("--light", default="plain", show_default=True, type=click.Choice(list(LIGHTS)))
 @click.option("--size", default="640x480", show_default=True, callback=_size)
 @click.option("--workers", default=1, show_default=True, type=click.IntRange(1))
@@ -95,6 +98,7 @@ def main(
     views: int,
     seed: int,
     noise: str,
+    sensor: str,
     light: str,
     size: tuple[int, int],
     workers: int,
@@ -104,22 +108,28 @@ def main(
 ) -> None:
     """Make tabletop scenes of MESHES in OUTPUT, and check a fifth of them."""
     try:
+        if noise != "none" and sensor != "none":
+            raise click.UsageError(
+                "--noise and --sensor exclude each other: a sensor brings its own"
+            )
         if data_root is None:
             if meshes is None:
                 raise click.UsageError("name the meshes: --meshes, or --data-root with --check")
             data_root = meshes.absolute().parent
         data_root = data_root.absolute()
         if check:
-            _report(_check_all(output, data_root, noise), output)
+            _report(_check_all(output, data_root, noise, sensor), output)
             return
         if meshes is None:
             raise click.UsageError("--meshes is needed to make scenes")
         import_library("pybullet")
+        if sensor == "stereo":
+            import_library("cv2")
         paths = chosen(find_meshes(meshes, only, skip), held_out)
         found = tuple(path.absolute() for path in paths)
         if not found[0].is_relative_to(data_root):
             raise click.UsageError(f"{meshes} does not lie below --data-root {data_root}")
-        plan = Plan(found, data_root, output, seed, views, noise, size, overwrite, light)
+        plan = Plan(found, data_root, output, seed, views, noise, size, overwrite, light, sensor)
         _report(list(_make_all(plan, scenes, workers)), output)
     except BrrpError as error:
         raise click.ClickException(str(error)) from error
@@ -140,14 +150,14 @@ def _make_all(plan: Plan, scenes: int, workers: int) -> Iterator[Distance]:
             yield from distances
 
 
-def _check_all(output: Path, data_root: Path, noise: str) -> list[Distance]:
+def _check_all(output: Path, data_root: Path, noise: str, sensor: str) -> list[Distance]:
     folders = sorted(path.parent for path in output.glob("*/objects.json"))
     if not folders:
         raise SceneError("No scene to check", where=output, expected="NNNNNNNN/objects.json")
     return [
         distance
         for folder in tqdm(folders, desc="check")
-        for distance in check_scene(folder, data_root, LIMITS[noise])
+        for distance in check_depth(folder, data_root, noise, sensor)
     ]
 
 

@@ -127,6 +127,7 @@ def _coverage(
                 "worst": float(outside.max()),
                 "share_each_point": float((p >= 1 - confidence).mean()),
                 "litre": float(mesh.volume) * 1000,
+                "growth": float(-outside.mean()),
             }
         )
     return rows

@@ -9,7 +9,7 @@ hypothesis c. Both posteriors over w are Gaussian. Each row is the mean over `--
     mean    RMS error of a hypothesis's mean weight, in its posterior's standard deviations
     pooled  the same, to the normalised product of both posteriors, each to the power of its share
     spread  variance of its particles over that of its posterior
-    weight  particles of the first hypothesis, as a share; its share of the posterior in brackets
+    weight  of the first hypothesis's particles; its share of the posterior in brackets
     value   error of the expected value y of the mixture at new x, over the noise
 """
 
@@ -28,7 +28,7 @@ from torch import Tensor
 # The script also runs from a checkout that is not installed.
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from brrp_cli.inference.infer_hypotheses import systematic_resampling
+from brrp_cli.inference.infer_hypotheses import particles_of
 from brrp_cli.inference.svgd import groups_of, run_svgd
 
 NOISE = 0.5
@@ -80,7 +80,8 @@ def errors(
     generator: torch.Generator,
 ) -> list[float]:
     """mean, pooled, spread, weight and value as the head of this file has them."""
-    which = torch.from_numpy(systematic_resampling(problem.shares.numpy(), particles))
+    placed, weights = particles_of(problem.shares.numpy(), particles)
+    which, share = torch.from_numpy(placed), torch.from_numpy(weights)
     dimension = problem.means.shape[1]
     start = 0.3 * torch.randn(particles, dimension, generator=generator, dtype=torch.float64)
     found = run_svgd(
@@ -99,12 +100,12 @@ def errors(
         if (which == c).sum() > 1
     ]
     new = torch.randn(200, dimension, generator=generator, dtype=torch.float64) / dimension**0.5
-    value = (found.mean(dim=0) - problem.shares @ problem.means) @ new.T / NOISE
+    value = (share @ found - problem.shares @ problem.means) @ new.T / NOISE
     return [
         float(((means - problem.means) / deviation).square().mean().sqrt()),
         float(((means - pool) / deviation).square().mean().sqrt()),
         float(torch.stack(spread).mean()),
-        float((which == 0).double().mean()),
+        float(share[which == 0].sum()),
         float(value.square().mean().sqrt()),
     ]
 

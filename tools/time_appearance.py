@@ -29,7 +29,7 @@ from brrp_cli.retrieval.illuminants import lights, local_lights, log_prior
 from brrp_cli.retrieval.observed_appearance import see_object
 from brrp_cli.retrieval.score_fusion import believe
 from brrp_cli.retrieval.shortlist import Shortlist
-from brrp_cli.retrieval.similarity import alignment_score, lit_histograms
+from brrp_cli.retrieval.similarity import lit_histograms, similarity
 
 
 @click.command()
@@ -47,26 +47,30 @@ def main(prior_path: Path, frame_path: Path) -> None:
     except BrrpError as error:
         raise click.ClickException(str(error)) from error
     looks = prior.appearance
-    gains = lights()
-    shortlist = Shortlist(looks.first)
+    own = preset("default").retrieval
+    gains = lights(own.illuminants)
+    shortlist = Shortlist(looks.first, own)
     plane = retriever.plane(frame)
     # Not the imports that come with the first of them.
-    see_object(frame, frame.object_ids[0], plane)
+    see_object(frame, frame.object_ids[0], plane, own.observed)
     seconds = dict.fromkeys(("see", "light", "look up"), 0.0)
     found = []
     for object_id in frame.object_ids:
         clock = [time.process_time()]
-        seen = see_object(frame, object_id, plane)
+        seen = see_object(frame, object_id, plane, own.observed)
         clock.append(time.process_time())
         histograms = lit_histograms(seen, gains)
         clock.append(time.process_time())
         rows = shortlist.rows(seen, histograms)
-        found.append(alignment_score(seen, histograms, looks.rows(rows), rows, len(gains)))
+        stored = looks.rows(rows)
+        found.append(similarity(seen, histograms, stored, rows, len(gains), own.similarity))
         clock.append(time.process_time())
         for stage, spent in zip(seconds, np.diff(clock), strict=True):
             seconds[stage] += float(spent)
     start = time.process_time()
-    answers = believe(found, log_prior(gains), local_lights(gains), len(looks))
+    lit = own.illuminants
+    light, local = log_prior(gains, lit), local_lights(gains, lit)
+    answers = believe(found, light, local, len(looks), own.fusion)
     for answer in answers:
         top_k(answer, prior.names, preset("default").k)
     seconds["look up"] += time.process_time() - start

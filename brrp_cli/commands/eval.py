@@ -9,7 +9,13 @@ from typing import Any
 
 import click
 
-from brrp_cli.commands.method_options import OneOf, check_weights, methods_help, weights_help
+from brrp_cli.commands.method_options import (
+    CONFIG_HELP,
+    OneOf,
+    check_weights,
+    methods_help,
+    weights_help,
+)
 from brrp_cli.commands.retriever_option import RetrieverName
 from brrp_cli.methods.registry import COMPARED, METHODS, preset_names
 from brrp_cli.progress import note
@@ -73,6 +79,13 @@ def _selection(ctx: click.Context, option: click.Parameter, value: str | None) -
     help=f"Of {', '.join(preset_names())}. [default: each method's first]",
 )
 @click.option(
+    "--config",
+    "configs",
+    multiple=True,
+    callback=_several(click.Path(path_type=Path)),
+    help=f"{CONFIG_HELP} Several are compared.",
+)
+@click.option(
     "--k",
     "ks",
     multiple=True,
@@ -116,6 +129,7 @@ def command(
     methods: list[str],
     weights: list[Path],
     presets: list[str],
+    configs: list[Path],
     ks: list[int],
     retrievers: list[str],
     clip_dir: Path | None,
@@ -152,6 +166,7 @@ def command(
         data_root=data_root,
         methods=methods,
         presets=presets,
+        configs=configs,
         ks=ks,
         retrievers=retrievers,
         shifts=shifts,
@@ -168,8 +183,10 @@ def command(
     )
     result = evaluate(request, say=note)
     for summary in result.summaries:
-        iou, chamfer = summary.figures["iou"], summary.figures["chamfer"]
-        figures = f"IoU {iou.value:.3f}  Chamfer {chamfer.value * 100:.2f} cm"
+        distance, f_score = summary.figures["surface_distance"], summary.figures["f_score_5mm"]
+        figures = f"distance {distance.value * 1000:.2f} mm  F(5 mm) {f_score.value:.3f}"
+        iou = summary.figures["iou"]
+        figures += f"  IoU as published {iou.value:.3f}"
         if not METHODS[summary.variant.method].gives_shapes:
             first, in_3 = summary.figures["true_first"], summary.figures["true_in_3"]
             figures = f"true object first {first.value:.3f}, among 3 {in_3.value:.3f}"

@@ -13,6 +13,8 @@ from brrp_cli.methods.base import Method
 from brrp_cli.methods.registry import METHODS
 from brrp_cli.nearest import nearest
 
+CONFIG_HELP = "TOML with numbers that differ from the preset's; brrp config show prints them all."
+
 
 class OneOf(click.ParamType):
     """One of the names that `names` gives when the value is read."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,6 +12,7 @@ import click
 from brrp_cli.commands.export import CONFIDENCE, export
 from brrp_cli.commands.frame import refuse_existing
 from brrp_cli.commands.method_options import (
+    CONFIG_HELP,
     OneOf,
     check_options,
     check_weights,
@@ -21,6 +22,7 @@ from brrp_cli.commands.method_options import (
 from brrp_cli.commands.retriever_option import RetrieverName
 from brrp_cli.commands.source_options import SourceOptions, source_options
 from brrp_cli.commands.view import PAGE, title, view
+from brrp_cli.files import atomic_path
 from brrp_cli.methods.registry import DEFAULT, METHODS, preset_names, reconstructing
 from brrp_cli.planning.options import PlanOptions
 from brrp_cli.planning.parts import HOW, check_available
@@ -29,13 +31,17 @@ from brrp_cli.retrieval.choose import RETRIEVERS, choose_retriever
 from brrp_cli.retrieval.clip.model_files import CLIP_DIR_VARIABLE
 
 if TYPE_CHECKING:
+    from brrp_cli.config.segmentation import SegmentConfig
     from brrp_cli.frames.frame import Frame
     from brrp_cli.methods.base import Method
     from brrp_cli.prior.store import Prior
-    from brrp_cli.reconstruction import Reconstruction
+    from brrp_cli.reconstruction import ObjectReconstruction, Reconstruction
     from brrp_cli.retrieval.base import Retriever
 
 SOME_FAILED = 3
+POSES = "poses_bop.csv"
+# A size that differs by less is told as the object's own.
+OWN_SIZE = 0.005
 NO_COLLISION = "none"
 
 
@@ -61,6 +67,7 @@ NO_COLLISION = "none"
     type=OneOf(preset_names),
     help="A named configuration of the method. [default: its first]",
 )
+@click.option("--config", "file", type=click.Path(path_type=Path), help=CONFIG_HELP)
 @click.option("--k", type=click.IntRange(min=1), help="Retrieved objects. [default: the preset's]")
 @click.option(
     "--retriever",
@@ -90,6 +97,11 @@ NO_COLLISION = "none"
     type=CONFIDENCE,
     help="With --collision: shapes inside which each object lies with this probability.",
 )
+@click.option(
+    "--poses",
+    type=click.Choice(["bop"]),
+    help=f"Also the 6D poses of recognised objects: OUT/{POSES}, a BOP results file.",
+)
 @click.option("--html", is_flag=True, help=f"Also what `brrp view` writes, OUT/{PAGE}.")
 @click.option("--view", "open_it", is_flag=True, help="The same, and open it in a browser.")
 @click.option("--overwrite", is_flag=True, help="Replace the output folder if it is there.")
@@ -100,6 +112,7 @@ def command(
     method: str,
     weights: Path | None,
     preset_name: str | None,
+    file: Path | None,
     k: int | None,
     retriever: str,
     clip_dir: Path | None,
@@ -109,6 +122,7 @@ def command(
     workers: int | None,
     collision: str,
     confidence: float | None,
+    poses: str | None,
     html: bool,
     open_it: bool,
     overwrite: bool,
@@ -131,8 +145,12 @@ def command(
       brrp reconstruct frame.npz --method vprism
       brrp reconstruct frame.npz --method pointsdf --weights prior.safetensors
       brrp reconstruct frame.npz --collision coacd --confidence 0.95
+      brrp reconstruct frame.npz --prior prior/ --poses bop
     """
     from brrp_cli.api import open_result, reconstruct
+    from brrp_cli.config.segmentation import SegmentConfig
+    from brrp_cli.methods.config_file import read_config
+    from brrp_cli.results.bop import bop_csv
     from brrp_cli.results.write import check_output, write_results
 
     source.check()
@@ -140,14 +158,17 @@ def command(
     check_collision(collision, confidence)
     chosen = METHODS[method]
     check_options(chosen, preset_name, device)
+    read = None if file is None else read_config(file)
+    config = chosen.preset(preset_name) if read is None else read.config(chosen, preset_name)
+    config = replace(config, k=k) if k else config
     output = output or source.name.with_name(f"{source.name.name}_{method}")
     # What can be refused is refused before the work, not after it.
     frame = source.read()
     check_output(output, frame, coordinates, overwrite=overwrite)
+    masks = None
     if source.prompt is not None or not frame.object_ids:
-        frame = make_masks(source, frame, output, seed, overwrite=overwrite)
-    config = chosen.preset(preset_name)
-    config = replace(config, k=k) if k else config
+        masks = SegmentConfig() if read is None else read.segmentation()
+        frame = make_masks(source, frame, output, seed, masks, overwrite=overwrite)
     prior, retrieval = open_prior_of(chosen, prior_path, config, retriever, clip_dir, seed)
     if prior is None:
         trained = "" if weights is None else f", weights {weights}"
@@ -163,14 +184,21 @@ def command(
         device=device,
         workers=workers,
     )
+    if masks is not None:
+        result = replace(result, segmentation=asdict(masks))
     write_results(result, output, frame=coordinates, overwrite=overwrite)
     report(result)
     done = len(result.reconstructed)
+    recognised = sum(item.recognised is not None for item in result.objects)
     meshes = "object_*.ply, scene.glb, " if done else "no mesh: result.json says why; "
     click.echo(
         f"Wrote {done} of {len(result.objects)} objects, metres, {coordinates} frame: {output}/ "
         f"({meshes}posterior.h5, result.json, preview.png)"
     )
+    if poses is not None:
+        with atomic_path(output / POSES) as path:
+            path.write_text(bop_csv(result, [] if prior is None else prior.names))
+        click.echo(f"Wrote the poses of {recognised} recognised objects: {output / POSES}")
     if done and collision != NO_COLLISION:
         options = PlanOptions(collision, confidence, seed=seed)
         export(open_result(output), None, options, overwrite=False)
@@ -181,7 +209,13 @@ def command(
 
 
 def make_masks(
-    source: SourceOptions, frame: Frame, output: Path, seed: int, *, overwrite: bool
+    source: SourceOptions,
+    frame: Frame,
+    output: Path,
+    seed: int,
+    config: SegmentConfig,
+    *,
+    overwrite: bool,
 ) -> Frame:
     """The frame with masks made on the way; a picture of them is written beside the output."""
     from brrp_cli.frames.build import require_objects
@@ -191,7 +225,7 @@ def make_masks(
         return require_objects(frame)
     picture = output.with_name(output.name + ".masks.png")
     refuse_existing([picture], overwrite)
-    frame = require_objects(source.make_masks(frame, seed))
+    frame = require_objects(source.make_masks(frame, seed, config))
     write_picture(frame, picture)
     how = f"the prompt {source.prompt!r}" if source.prompt else "what stands on the table"
     note(f"Masks: made on the way from {how}, {len(frame.object_ids)} objects: {picture}")
@@ -237,10 +271,22 @@ def open_prior_of(
 def report(result: Reconstruction) -> None:
     """Print a line for each object."""
     for item in result.objects:
-        best = item.retrieved[0] if item.retrieved else None
-        match = f"{best.name} {best.probability:.2f}" if best else ""
-        if item.unknown_probability >= 0.5:
-            match += f" (not in the prior: {item.unknown_probability:.2f})"
+        match = outcome(item)
         seconds = f"{sum(item.seconds.values()):.1f} s" if item.seconds else ""
         text = "; ".join(part for part in (match, item.message, seconds) if part)
         note(f"  object {item.object_id}: {item.status}  {text}")
+
+
+def outcome(item: ObjectReconstruction) -> str:
+    """What the object was taken for, with its weight; of the paper's preset, what was retrieved."""
+    found = item.recognised
+    if found is not None:
+        size = found.size_factor or 1.0
+        other = "" if abs(size - 1) < OWN_SIZE else f", {size:.2f} of its size"
+        return f"{found.name} (weight {found.weight:.2f}{other})"
+    best = item.retrieved[0] if item.retrieved else None
+    if best is None:
+        return ""
+    if item.unknown_weight is not None:
+        return f"not in the prior (weight {item.unknown_weight:.2f}; most like {best.name})"
+    return f"{best.name} (retrieved with {best.probability:.2f})"

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import click
 
 from brrp_cli.commands.frame import refuse_existing, tell
+from brrp_cli.commands.method_options import CONFIG_HELP
 from brrp_cli.commands.source_options import SourceOptions, source_options
 
 if TYPE_CHECKING:
@@ -47,6 +48,7 @@ def _splits(
     "--merge", "merges", multiple=True, callback=_ids, metavar="ID,ID", help="Make them one."
 )
 @click.option("--drop", "drops", multiple=True, callback=_ids, metavar="ID", help="Forget them.")
+@click.option("--config", "file", type=click.Path(path_type=Path), help=CONFIG_HELP)
 @click.option("--seed", default=0, show_default=True)
 @click.option("-o", "--output", type=click.Path(path_type=Path), required=True, help="FRAME.npz")
 @click.option("--overwrite", is_flag=True, help="Replace what stands at the output.")
@@ -56,6 +58,7 @@ def command(
     splits: list[tuple[int, int]],
     merges: list[list[int]],
     drops: list[list[int]],
+    file: Path | None,
     seed: int,
     output: Path,
     overwrite: bool,
@@ -80,17 +83,20 @@ def command(
     picture, ids = output.with_suffix(".masks.png"), output.with_suffix(".ids.png")
     refuse_existing([output, picture, ids], overwrite)
 
+    from brrp_cli.config.segmentation import SegmentConfig
     from brrp_cli.frames.build import require_objects
     from brrp_cli.frames.npz import save_frame
+    from brrp_cli.methods.config_file import read_config
     from brrp_cli.segmentation import edit_masks
     from brrp_cli.segmentation.mask_picture import write_ids, write_picture
 
+    config = SegmentConfig() if file is None else read_config(file).segmentation()
     frame = source.read()
     if again or source.prompt is not None or not frame.object_ids:
-        frame = source.make_masks(frame, seed)
+        frame = source.make_masks(frame, seed, config)
     before = frame
     for object_id, pieces in splits:
-        frame = replace(frame, segmap=edit_masks.split(frame, object_id, pieces, seed))
+        frame = replace(frame, segmap=edit_masks.split(frame, object_id, pieces, seed, config))
     for group in merges:
         frame = replace(frame, segmap=edit_masks.merge(frame, group))
     for group in drops:

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import wraps
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
 if TYPE_CHECKING:
+    from brrp_cli.config.segmentation import SegmentConfig
     from brrp_cli.frames.frame import Frame
 
 _PATH = click.Path(path_type=Path)
@@ -48,14 +50,12 @@ def source_options(function: Callable[..., Any]) -> Callable[..., Any]:
     names = ["color", "depth", "intrinsics", "masks", "index", "color_topic", "depth_topic"]
     names += ["depth_scale", "prompt", "masks_dir"]
 
+    # Its help, and the options that decorators below have left there, come along.
+    @wraps(function)
     def command(**values: Any) -> Any:
         options = SourceOptions(values.pop("path"), **{name: values.pop(name) for name in names})
         return function(source=options, **values)
 
-    # Click reads the help, and the options that decorators below have left, from the function.
-    command.__doc__ = function.__doc__
-    command.__name__ = function.__name__
-    command.__click_params__ = getattr(function, "__click_params__", [])  # type: ignore[attr-defined]
     wrapped: Callable[..., Any] = command
     for option in reversed(_OPTIONS):
         wrapped = option(wrapped)
@@ -120,7 +120,7 @@ class SourceOptions:
             self.color, self.depth, self.intrinsics, self.masks, depth_scale=self.depth_scale
         )
 
-    def make_masks(self, frame: Frame, seed: int) -> Frame:
+    def make_masks(self, frame: Frame, seed: int, config: SegmentConfig | None = None) -> Frame:
         """The frame with masks made anew: by the prompt where there is one, else without a model.
 
         Errors: FrameError if nothing is found; MaskError if the models cannot be used.
@@ -130,7 +130,8 @@ class SourceOptions:
         from brrp_cli.segmentation.segment import segment
 
         if self.prompt is None:
-            return replace(frame, segmap=segment(frame, seed))
+            return replace(frame, segmap=segment(frame, seed, config))
         from brrp_cli.segmentation.prompted.segment_by_prompt import PromptSegmenter
 
-        return replace(frame, segmap=PromptSegmenter(self.masks_dir)(frame, self.prompt, seed))
+        segmenter = PromptSegmenter(self.masks_dir, config)
+        return replace(frame, segmap=segmenter(frame, self.prompt, seed))

@@ -19,9 +19,6 @@ from brrp_cli.observation.support_plane import Plane
 Array = NDArray[np.float64]
 Floats = NDArray[np.float32]
 
-# Metres before the measured depth that still count as the seen surface.
-SHELL_BEFORE = 0.001
-
 
 def completed_grid(
     nodes: Array, empty: NDArray[np.bool_], part: VisiblePart, config: MeanConfig
@@ -77,7 +74,7 @@ def _with_crust(
     limited = np.clip(logits, -config.limit, config.limit)
     behind = -depth_behind(points, part.frame)
     own = at_pixels(points, part.frame.segmap, part.frame) == part.object_id
-    crust = own & (np.nan_to_num(behind, nan=np.inf) < shell) & (behind > -SHELL_BEFORE)
+    crust = own & (np.nan_to_num(behind, nan=np.inf) < shell) & (behind > -config.shell_before)
     return np.where(crust, np.maximum(limited, config.shell_logit), limited)
 
 

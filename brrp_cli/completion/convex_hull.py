@@ -8,20 +8,21 @@ from scipy.spatial import ConvexHull, QhullError
 
 Array = NDArray[np.float64]
 
-# Points in one plane have no hull: they are moved by this standard deviation, metres.
-THICKNESS = 0.0005
 CHUNK = 512
 
 
-def hull_facets(points: Array) -> Array:
-    """The convex hull of points (n, 3) as facets (f, 4): outward unit normal and offset."""
+def hull_facets(points: Array, thickness: float) -> Array:
+    """The convex hull of points (n, 3) as facets (f, 4): outward unit normal and offset.
+
+    thickness : metres, standard deviation by which points in one plane, which have no hull, move
+    """
     try:
         hull = ConvexHull(points)
     except QhullError:
         # Fewer than four points, or all in one plane.
         rng = np.random.default_rng(0)
         copies = np.concatenate([points] * 4)
-        hull = ConvexHull(copies + rng.normal(0, THICKNESS, copies.shape))
+        hull = ConvexHull(copies + rng.normal(0, thickness, copies.shape))
     # Qhull splits a flat facet into triangles of one equation.
     return np.unique(hull.equations.round(6), axis=0)
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from brrp_cli.completion.convex_hull import outside_hull
-from brrp_cli.completion.visible_part import LEAST, MOST, VisiblePart
+from brrp_cli.completion.visible_part import VisiblePart
 from brrp_cli.frames.frame import BACKGROUND
 from brrp_cli.frames.projection import pixel_numbers
 from brrp_cli.geometry import transform_points
@@ -20,11 +20,6 @@ from brrp_cli.geometry import transform_points
 Array = NDArray[np.float64]
 Features = NDArray[np.float32]
 
-# Lengths beyond these tell nothing more, metres; ratios likewise.
-FAR = 0.2
-RATIO = 4.0
-# Metres, added to what a length is divided by that may be 0.
-THIN = 0.002
 # Lengths, of which the last are the object's own, the same at all points.
 COUNT, WHOLE = 72, 9
 # Steps to where free space is looked for, in the object's sizes.
@@ -34,9 +29,10 @@ NOWHERE = np.iinfo(np.int64).min
 
 
 def point_features(points: Array, part: VisiblePart) -> Features:
-    """(n, `COUNT`) of points (n, 3), metres, camera frame. Lengths stand in tenths of `FAR` and in
+    """(n, `COUNT`) of points (n, 3), metres, camera frame. Lengths stand in tenths of `far` and in
     the object's sizes; without a plane, heights count as in the middle of the object."""
-    frame, size = part.frame, part.size
+    frame, size, config = part.frame, part.size, part.config
+    far, ratio, thin = config.far, config.ratio, config.thin
     pixel, visible = pixel_numbers(points, frame)
     label = np.where(visible, frame.segmap.ravel()[pixel], NOWHERE)
     behind = _behind(points, pixel, visible, part)
@@ -102,24 +98,24 @@ def point_features(points: Array, part: VisiblePart) -> Features:
         *_image(points - turn @ np.stack([part.across, part.ahead]), part),
     ]
     whole = [
-        size / FAR,
+        size / far,
         part.top / size,
         part.width / size,
         length / size,
         part.depths.mean() / size,
-        np.quantile(part.depths, MOST[1]) / size,
+        np.quantile(part.depths, config.most[1]) / size,
         *(2 * part.rectangle.half / size),
         part.free,
     ]
-    columns = [np.clip(one / size, -RATIO, RATIO) for one in each + mirrored]
-    columns += [np.clip(one, -FAR, FAR) / (FAR / 10) for one in each]
+    columns = [np.clip(one / size, -ratio, ratio) for one in each + mirrored]
+    columns += [np.clip(one, -far, far) / (far / 10) for one in each]
     columns += [
         label == part.object_id,
         label == BACKGROUND,
-        np.clip(behind / (silhouette + THIN), -RATIO, RATIO),
-        np.clip(height / max(part.top, LEAST), -1, RATIO),
-        np.clip(round_ / center, 0, RATIO),
-        np.clip(behind / (local_thickness + THIN), -RATIO, RATIO),
+        np.clip(behind / (silhouette + thin), -ratio, ratio),
+        np.clip(height / max(part.top, config.least), -1, ratio),
+        np.clip(round_ / center, 0, ratio),
+        np.clip(behind / (local_thickness + thin), -ratio, ratio),
         normal @ part.ahead,
         np.abs(normal @ part.across),
         normal @ part.up,
@@ -148,7 +144,7 @@ def _behind(
     """How far (n,) points (n, 3) lie behind the measured depth, metres; 0 where there is none."""
     measured = part.frame.points[..., 2].ravel()[pixel]
     behind = np.where(visible, points[:, 2] - measured, 0.0)
-    return np.clip(np.nan_to_num(behind), -FAR, FAR)
+    return np.clip(np.nan_to_num(behind), -part.config.far, part.config.far)
 
 
 def _image(image: Array, part: VisiblePart) -> list[NDArray[np.floating]]:

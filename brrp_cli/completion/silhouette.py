@@ -11,12 +11,12 @@ from brrp_cli.frames.frame import BACKGROUND, Frame
 
 Image = NDArray[np.float32]
 
-# Radii at which limbs are measured, and pixels along the longer side of the image that they are
-# measured in: a limb of a large silhouette is many pixels wide.
-WIDTHS, SIDE = 12, 100
+# Pixels along the longer side of the image that limbs are measured in: a limb of a large silhouette
+# is many pixels wide.
+SIDE = 100
 
 
-def silhouettes(frame: Frame, object_id: int) -> tuple[Image, Image]:
+def silhouettes(frame: Frame, object_id: int, radii: int) -> tuple[Image, Image]:
     """`within_silhouette` and `local_thickness` (H, W) where the object is or may
     go on, 0 elsewhere."""
     rows, columns = np.nonzero(frame.segmap == object_id)
@@ -27,7 +27,7 @@ def silhouettes(frame: Frame, object_id: int) -> tuple[Image, Image]:
     )
     silhouette, limbs = np.zeros((2, *frame.shape), dtype=np.float32)
     silhouette[window] = within_silhouette(frame.segmap[window])
-    limbs[window] = _thinned_thickness(silhouette[window])
+    limbs[window] = _thinned_thickness(silhouette[window], radii)
     return silhouette, limbs
 
 
@@ -38,23 +38,23 @@ def within_silhouette(segmap: NDArray[np.integer]) -> Image:
     return distance_transform_edt(~ground)[1:-1, 1:-1].astype(np.float32)
 
 
-def _thinned_thickness(within: Image) -> Image:
+def _thinned_thickness(within: Image, radii: int) -> Image:
     """`local_thickness` of every so many pixels, repeated."""
     step = 1 + max(within.shape) // SIDE
     if step == 1:
-        return local_thickness(within)
-    thick = local_thickness(within[::step, ::step] / step) * step
+        return local_thickness(within, radii)
+    thick = local_thickness(within[::step, ::step] / step, radii) * step
     rows, columns = within.shape
     repeated = thick.repeat(step, axis=0)[:rows].repeat(step, axis=1)[:, :columns]
     return np.where(within > 0, repeated, 0).astype(np.float32)
 
 
-def local_thickness(within: Image) -> Image:
+def local_thickness(within: Image, radii: int) -> Image:
     """(H, W) pixels, the radius of the largest disc within the silhouette that has the pixel in
     it: of a handle or a stalk it is small, however large the object."""
     width = within.copy()
     top = float(within.max())
-    for radius in np.geomspace(2, top, WIDTHS) if top > 2 else ():
+    for radius in np.geomspace(2, top, radii) if top > 2 else ():
         reached = distance_transform_edt(within < radius) <= radius
         width[reached & (width < radius)] = radius
     return np.where(within > 0, width, 0).astype(np.float32)

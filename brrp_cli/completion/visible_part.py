@@ -24,12 +24,6 @@ Array = NDArray[np.float64]
 
 # Of the image: as good a guess as any where there is no plane.
 UPRIGHT = np.array([0.0, -1.0, 0.0])
-# Metres; smaller extents are as noisy as depth is.
-LEAST = 0.005
-# Shares of the seen points between which an object's size is taken: strays do not count.
-MOST = (0.02, 0.98)
-# Seen points whose spread gives a normal.
-NEIGHBOURS = 12
 # Pairs of seen points between which one looks for free space, and how far in front of the measured
 # depth that begins, metres.
 PAIRS, FREE = 1000, 0.006
@@ -76,6 +70,7 @@ class VisiblePart:
     free: float
     silhouette: Image
     limbs: Image
+    config: CompletionConfig
 
     @property
     def up(self) -> Array:
@@ -102,8 +97,8 @@ def visible_part(
 ) -> VisiblePart:
     """From an object's observed points (n, 3), metres, camera frame, and its support plane."""
     seen = grid_subsample(points, config.cell).astype(np.float64)
-    low, high = np.quantile(seen, MOST, axis=0)
-    size = max(float(np.linalg.norm(high - low)), LEAST)
+    low, high = np.quantile(seen, config.most, axis=0)
+    size = max(float(np.linalg.norm(high - low)), config.least)
     up = UPRIGHT if plane is None else plane.normal
     if plane is None:
         feet, height_map, top = np.zeros((0, 3)), None, size / 2
@@ -111,19 +106,19 @@ def visible_part(
         height = np.maximum(plane.signed_distance(seen), 0.0)
         feet = seen - height[:, None] * up
         height_map = height_map_over(points, plane, config)
-        top = float(np.quantile(height, MOST[1]))
-    silhouette, limbs = silhouettes(frame, object_id)
-    facets = hull_facets(np.concatenate([seen, feet]))
+        top = float(np.quantile(height, config.most[1]))
+    silhouette, limbs = silhouettes(frame, object_id, config.radii)
+    facets = hull_facets(np.concatenate([seen, feet]), config.thickness)
     sight = seen.mean(axis=0)
     across = normalise(np.cross(up, sight))
     ahead = np.cross(across, up)
-    front, back = np.quantile(seen @ ahead, MOST)
-    left, right = np.quantile(seen @ across, MOST)
-    width = max(float(right - left), LEAST)
-    normals = surface_normals(seen)
+    front, back = np.quantile(seen @ ahead, config.most)
+    left, right = np.quantile(seen @ across, config.most)
+    width = max(float(right - left), config.least)
+    normals = surface_normals(seen, config.neighbours)
     x = seen @ across - (left + right) / 2
     y = seen @ ahead - front - max(width, float(back - front)) / 2
-    radii = np.maximum(np.hypot(x, y), LEAST / 10)
+    radii = np.maximum(np.hypot(x, y), config.least / 10)
     outward = (x * (normals @ across) + y * (normals @ ahead)) / radii
     return VisiblePart(
         frame=frame,
@@ -148,13 +143,14 @@ def visible_part(
         free=_free_between(seen, frame),
         silhouette=silhouette,
         limbs=limbs,
+        config=config,
     )
 
 
-def surface_normals(seen: Array) -> Array:
+def surface_normals(seen: Array, neighbours: int) -> Array:
     """Unit normals (n, 3), towards the camera, of points (n, 3), camera frame: the direction in
     which a point's neighbours vary least."""
-    count = min(NEIGHBOURS, len(seen))
+    count = min(neighbours, len(seen))
     _, rows = cKDTree(seen).query(seen, k=[*range(1, count + 1)])
     near = seen[rows] - seen[rows].mean(axis=1, keepdims=True)
     _, directions = np.linalg.eigh(np.einsum("nki,nkj->nij", near, near))

@@ -1,4 +1,4 @@
-"""Means with bootstrap intervals over scenes.
+"""Means and medians with bootstrap intervals over scenes.
 
 Objects of one scene share its clutter, its view and its camera, so that they are no independent
 draws: whole scenes are drawn again, with all of their objects (cluster bootstrap).
@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -65,6 +66,33 @@ def mean_interval(
     total = np.bincount(which, weights=array[there])
     value, low, high = cluster_bootstrap(np.column_stack([total, count]), _ratio, rng)
     return Interval(value, low, high, int(there.sum()))
+
+
+def median_interval(
+    values: Sequence[float], clusters: Sequence[str], rng: np.random.Generator
+) -> Interval:
+    """Median of the values that are there (not NaN) over objects, drawn by cluster (scene)."""
+    array = np.asarray(values, dtype=np.float64)
+    there = ~np.isnan(array)
+    if not there.any():
+        return Interval(math.nan)
+    array = array[there]
+    names, which = np.unique(np.asarray(clusters)[there], return_inverse=True)
+    # Of each cluster: how many objects it adds at each place of the sorted values.
+    order = np.argsort(array)
+    ordered, adds = array[order], np.zeros((len(names), len(array)))
+    adds[which[order], np.arange(len(array))] = 1
+    value, low, high = cluster_bootstrap(adds, partial(_median, ordered), rng)
+    return Interval(value, low, high, len(array))
+
+
+def _median(ordered: Floats, counts: Floats) -> Floats:
+    """Medians (r,) of ascending values (n,) that count `counts` (r, n) times each."""
+    below = counts.cumsum(axis=1)
+    total = below[:, -1]
+    lower = (below < ((total + 1) // 2)[:, None]).sum(axis=1)
+    upper = (below < (total // 2 + 1)[:, None]).sum(axis=1)
+    return np.asarray((ordered[lower] + ordered[upper]) / 2)
 
 
 def calibration_interval(

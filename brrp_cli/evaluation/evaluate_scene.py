@@ -22,7 +22,7 @@ from brrp_cli.ground_truth.scenes import Scene
 from brrp_cli.ground_truth.surface_metrics import (
     TrueSurface,
     no_surface,
-    score_surface,
+    score_written,
     true_surface,
 )
 from brrp_cli.ground_truth.true_meshes import close_truth
@@ -89,8 +89,7 @@ def true_objects(plan: Plan, scene: Scene, clean: Frame) -> dict[int, Truth | Br
             true_object = scene.object(object_id)
             meshes = close_truth(true_object, plan.data_root, plan.cache)
             shape = true_shape(meshes, clean, rng)
-            rng = child_rng(plan.seed, "true surface", scene.name, object_id)
-            surface = true_surface(shape.mesh, clean, object_id, rng)
+            surface = true_surface(shape.mesh.measured, clean, object_id, scene.name, plan.seed)
             size = half_extent(meshes.exact.vertices, true_object.T_world_object)
             truths[object_id] = Truth(shape, surface, size)
         except BrrpError as error:
@@ -214,8 +213,8 @@ def _row(
     if isinstance(truth, BrrpError):
         return {**row, "status": FAILED, "message": str(truth)}
     if item.surface is not None:
-        rng = child_rng(plan.seed, "written", scene.name, object_id)
-        row |= score_surface(item.surface.as_trimesh(), truth.surface, rng)
+        mesh = item.surface.as_trimesh()
+        row |= score_written(mesh, truth.surface, scene.name, plan.seed)
     if item.posterior is not None:
         rng = child_rng(plan.seed, "score", scene.name, object_id)
         scores, diagrams = score_probabilities(item.posterior, truth.shape)
@@ -227,9 +226,10 @@ def _row(
         row |= recognition(item, row["name"], in_prior, truth.half_extent)
     placed = [r for r in item.retrieved if r.T_cam_object is not None]
     if placed and plan.prior is not None:
-        row["placement_error"] = placement_error(
-            placed[0], _stored(plan.prior, placed[0].name), truth.shape
-        )
+        # Without weights, the most probable.
+        best = max(placed, key=lambda each: each.weight or 0.0)
+        stored = _stored(plan.prior, best.name)
+        row["placement_error"] = placement_error(best, stored, truth.shape)
     return row
 
 

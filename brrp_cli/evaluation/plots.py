@@ -23,10 +23,11 @@ Labels = dict[Variant, str]
 def write_plots(folder: Path, summaries: Sequence[VariantSummary], labels: Labels) -> list[Path]:
     """Every plot that these variants allow; returns the files.
 
-    chamfer.png, reliability.png, timing.png; iou_k.png where k varies; iou_shift.png where shifted
-    and unshifted masks are both there.
+    distance.png, chamfer.png, reliability.png, timing.png; iou_k.png where k varies; iou_shift.png
+    where shifted and unshifted masks are both there.
     """
     figures = {
+        "distance": distance_bars(summaries, labels),
         "chamfer": chamfer_bars(summaries, labels),
         "iou_k": iou_against_k(summaries),
         "iou_shift": shifted_bars(summaries),
@@ -40,6 +41,15 @@ def write_plots(folder: Path, summaries: Sequence[VariantSummary], labels: Label
                 figure.savefig(partial, dpi=110, metadata={"Software": None})
             written.append(folder / f"{name}.png")
     return written
+
+
+def distance_bars(summaries: Sequence[VariantSummary], labels: Labels) -> Any:
+    """Mean distance of each variant's written meshes and the exact ones, mm, with intervals."""
+    figure, (axes,) = _figure(1, width=2 + 1.2 * len(summaries))
+    bars = [(labels[s.variant], s.figures["surface_distance"]) for s in summaries]
+    _bars(axes, bars, factor=1000)
+    axes.set_ylabel("surface distance, mm (lower is better)")
+    return figure
 
 
 def chamfer_bars(summaries: Sequence[VariantSummary], labels: Labels) -> Any:

@@ -2,17 +2,32 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
 from brrp_cli.reconstruction import ObjectReconstruction, Retrieved
 
+Row = dict[str, Any]
+
 RECOGNITION = ("recognised", "taken_for", "weight_true", "weight_best", "size_factor")
+# Shares and means over objects that each of them asks for.
+RECOGNITION_FIGURES = (
+    "recognised_clear",
+    "weight_true_clear",
+    "other_size",
+    "placement_recognised",
+    "stranger_taken",
+)
+CLEAR_PIXELS = 1000  # visible; fewer may be too few to tell
+OTHER_SIZE = 0.02  # share of its true size by which a placed model is off at another size
+TAKEN = 0.5  # weight at which a stranger is taken for a stored object
 
 
 def recognition(
     item: ObjectReconstruction, true_name: str, in_prior: bool, true_half_extent: float
-) -> dict[str, object]:
+) -> Row:
     """`RECOGNITION` of one object; empty where the method weighs no hypotheses.
 
     true_half_extent : half the longest side of the true mesh's box along its own axes, metres
@@ -26,7 +41,7 @@ def recognition(
     if not weighed:
         return {}
     weight, best = max(weighed, key=lambda pair: pair[0])
-    found: dict[str, object] = {
+    found: Row = {
         "taken_for": best.name if weight > 0 else None,
         "weight_best": weight,
     }
@@ -39,6 +54,24 @@ def recognition(
         "weight_true": 0.0 if mine is None else mine.weight,
         "size_factor": _placed_half_extent(best) / true_half_extent if recognised else None,
     }
+
+
+def with_recognition(row: Row) -> Row:
+    """With `RECOGNITION_FIGURES`, each where it has a meaning: of objects of the prior with at
+    least 1,000 visible pixels, whether they are recognised and the weight of the true object; of
+    recognised ones, whether they are placed at another size, and the distance of the placed model
+    to the true surface; of others, whether more than half of the weight is on one stored object."""
+    more: Row = {}
+    recognised = row.get("recognised")
+    if recognised is not None and row["visible_pixels"] >= CLEAR_PIXELS:
+        more |= {"recognised_clear": recognised, "weight_true_clear": row["weight_true"]}
+    if recognised:
+        # Not at its own size where it has none, too.
+        own = row["size_factor"] is not None and abs(row["size_factor"] - 1) <= OTHER_SIZE
+        more |= {"other_size": not own, "placement_recognised": row.get("placement_error")}
+    if recognised is None and row.get("weight_best") is not None:
+        more["stranger_taken"] = row["weight_best"] > TAKEN
+    return {**row, **{name: value for name, value in more.items() if value is not None}}
 
 
 def _placed_half_extent(placed: Retrieved) -> float:

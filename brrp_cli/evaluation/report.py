@@ -1,4 +1,4 @@
-"""report.md: the paper's table and ours, and everything else that was measured."""
+"""report.md: the written meshes, then probabilities, retrieval, and the published protocol."""
 
 from __future__ import annotations
 
@@ -9,14 +9,20 @@ from typing import Any
 
 from brrp_cli.evaluation import published
 from brrp_cli.evaluation.bootstrap import Interval
+from brrp_cli.evaluation.markdown import Column, figure, table
+from brrp_cli.evaluation.report_written import WRITTEN_NOTES, written_sections
 from brrp_cli.evaluation.rows import STAGES
 from brrp_cli.evaluation.summary import VariantSummary
 from brrp_cli.evaluation.variants import Variant
 
 Labels = Mapping[Variant, str]
 Differences = Mapping[tuple[Variant, Variant], Mapping[str, Interval]]
-Column = tuple[str, str, float, int]  # heading, metric, factor, decimals
 
+WRITTEN_DIFFERENCES: list[Column] = [
+    ("distance, mm", "surface_distance", 1000, 2),
+    ("F 2 mm", "f_score_2mm", 1, 3),
+    ("F 5 mm", "f_score_5mm", 1, 3),
+]
 PUBLISHED_WAY: list[Column] = [("IoU", "iou", 1, 3), ("Chamfer, cm", "chamfer", 100, 2)]
 EXACT: list[Column] = [
     ("IoU", "iou_exact", 1, 3),
@@ -31,6 +37,13 @@ PROBABILITIES: list[Column] = [
     ("AUSE", "ause_{}", 1, 3),
     ("AUSE, by entropy", "ause_entropy_{}", 1, 3),
 ]
+RECOGNISED: list[Column] = [
+    ("recognised, of 1,000 px or more", "recognised_clear", 1, 3),
+    ("weight of the true object", "weight_true_clear", 1, 3),
+    ("recognised at another size", "other_size", 1, 3),
+    ("placed model to true surface, mm, of recognised", "placement_recognised", 1000, 2),
+    ("strangers taken for a stored object", "stranger_taken", 1, 3),
+]
 PLACEMENT: list[Column] = [
     ("true object first", "true_first", 1, 2),
     ("among the first 3", "true_in_3", 1, 2),
@@ -39,17 +52,22 @@ PLACEMENT: list[Column] = [
     ("ECE of P(c\\|R)", "ece_retrieval", 1, 3),
     ("P(not in prior), of those in it", "absent_inside", 1, 2),
     ("of those not in it", "absent_outside", 1, 2),
-    ("placed model to true surface, cm", "placement_error", 100, 2),
+    ("placed model to true surface, mm", "placement_error", 1000, 2),
 ]
 
 NOTES = """\
 How to read it:
 
-- Objects with at least 16 visible pixels in the first view of each scene. An object whose
-  reconstruction holds nothing (**empty**) has IoU 0 and F-score 0 and no Chamfer distance; one
-  without any reconstruction (**failed**) has no metric. Both are counted beside the means.
+{written}- Objects with at least 16 visible pixels in the first view of each scene. An object whose
+  posterior holds nothing (**empty**) has IoU 0 and F-score 0 on the grids and no Chamfer distance;
+  one without any posterior (**failed**) has none of the metrics on grids. Both are counted beside
+  the means.
 - In brackets: 95 % bootstrap interval over scenes (whole scenes are drawn again, {rounds} times).
-- Published way: true mesh closed by point-cloud-utils at resolution 4,000 (IoU) and 10,000
+- Recognised: more weight on the true object than on any other stored object and than on "none of
+  them". At another size: the placed model is more than 2 % larger or smaller than the true one. A
+  stranger, which the prior does not hold, is taken for a stored object where that has a weight
+  over 0.5.
+- Published protocol: true mesh closed by point-cloud-utils at resolution 4,000 (IoU) and 10,000
   (Chamfer), which thickens thin walls; 1.5 cm grid over ±0.2 m around the middle of the true
   bounding box, along the world's axes; Chamfer is the sum of both mean distances between 8,000
   points of either surface. Exact: the same against the true mesh that is repaired but not
@@ -74,45 +92,32 @@ def write_report(
     parts = [
         f"# Evaluation of {record['scenes_total']} scenes",
         _facts(record),
-        "## The published metrics",
+        *written_sections(summaries, labels),
+    ]
+    for region, title in (("occluded", "occluded points"), ("near", "all points near the objects")):
+        columns = [(head, name.format(region), f, d) for head, name, f, d in PROBABILITIES]
+        parts += [f"## Probabilities, {title}", _figures_table(summaries, labels, columns)]
+    with_prior = [s for s in summaries if s.variant.retriever is not None]
+    if with_prior:
+        parts += ["## Recognition", _figures_table(with_prior, labels, RECOGNISED)]
+        parts += ["## Retrieval", _figures_table(with_prior, labels, PLACEMENT)]
+        parts += ["Objects of the prior, by visible pixels:", _hits_table(with_prior, labels)]
+    parts += [
+        "## The published protocol, for comparison with the paper",
         _figures_table(summaries, labels, PUBLISHED_WAY),
         _same(record),
         "The paper's table, on its own scenes (other objects, other renderings: orders of "
         "magnitude may be compared, not decimals):",
         _paper_table(),
-        "## Against the exact mesh",
+        "The same grid against the exact mesh, and a finer one:",
         _figures_table(summaries, labels, EXACT),
     ]
     if found:
         parts += ["## What knowledge of objects adds", _difference_table(found, labels)]
-    for region, title in (("near", "all points near the objects"), ("occluded", "occluded points")):
-        columns = [(head, name.format(region), f, d) for head, name, f, d in PROBABILITIES]
-        parts += [f"## Probabilities, {title}", _figures_table(summaries, labels, columns)]
-    with_prior = [s for s in summaries if s.variant.retriever is not None]
-    if with_prior:
-        parts += ["## Retrieval and registration", _figures_table(with_prior, labels, PLACEMENT)]
-        parts += ["Objects of the prior, by visible pixels:", _hits_table(with_prior, labels)]
     parts += ["## Time and memory", _cost_table(summaries, labels), "## Plots"]
     parts += [f"![{path.stem}]({path.parent.name}/{path.name})" for path in plots]
-    parts += ["## Notes", NOTES.format(rounds=record["bootstrap_rounds"])]
+    parts += ["## Notes", NOTES.format(rounds=record["bootstrap_rounds"], written=WRITTEN_NOTES)]
     return "\n\n".join(part.rstrip() for part in parts if part) + "\n"
-
-
-def table(headings: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """A table in Markdown."""
-    lines = [headings, ["---"] * len(headings), *rows]
-    return "\n".join("| " + " | ".join(line) + " |" for line in lines)
-
-
-def figure(interval: Interval, factor: float, decimals: int) -> str:
-    """`0.512 [0.480, 0.544]`; a dash where there is no value."""
-    if math.isnan(interval.value):
-        return "–"
-    value = f"{interval.value * factor:.{decimals}f}"
-    if math.isnan(interval.low):
-        return value
-    bounds = (f"{bound * factor:.{decimals}f}" for bound in (interval.low, interval.high))
-    return f"{value} [{', '.join(bounds)}]"
 
 
 def _figures_table(
@@ -156,10 +161,11 @@ def _paper_table() -> str:
 
 
 def _difference_table(found: Differences, labels: Labels) -> str:
-    columns = [*PUBLISHED_WAY, *EXACT]
+    columns = [*WRITTEN_DIFFERENCES, *PUBLISHED_WAY, *EXACT]
+    first = len(columns) - len(EXACT)
     headings = [
         "",
-        *(f"{head}{' (exact)' * (c >= 2)}" for c, (head, *_) in enumerate(columns)),
+        *(f"{head}{' (exact)' * (c >= first)}" for c, (head, *_) in enumerate(columns)),
         "pairs",
     ]
     rows = [

@@ -29,6 +29,7 @@ from brrp_cli.evaluation.work import Plan
 from brrp_cli.files import sha256_file, write_bytes
 from brrp_cli.ground_truth.scenes import Scene, find_scenes
 from brrp_cli.ground_truth.true_meshes import truth_cache
+from brrp_cli.methods.config_file import read_config
 from brrp_cli.methods.registry import METHODS
 from brrp_cli.prior.store import Prior
 from brrp_cli.progress import progress
@@ -53,6 +54,7 @@ class Request:
     data_root: Path | None = None
     prior: Path | None = None
     weights: list[Path] = field(default_factory=list)
+    configs: list[Path] = field(default_factory=list)
     clip_dir: Path | None = None
     noise: bool = False
     selection: slice | None = None
@@ -92,6 +94,7 @@ def evaluate(request: Request, say: Callable[[str], None] = lambda text: None) -
         [resolve_name(name, request.clip_dir) for name in request.retrievers],
         request.shifts,
         list(weights),
+        [read_config(path) for path in request.configs],
     )
     _check_prior(opened, variants)
     if any(variant.retriever in USE_CLIP for variant in variants):

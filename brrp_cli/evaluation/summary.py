@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brrp_cli.evaluation.bootstrap import Interval, calibration_interval, mean_interval
+from brrp_cli.evaluation.recognition import RECOGNITION_FIGURES, with_recognition
 from brrp_cli.evaluation.retrieval import (
     Hits,
     hits_by_pixels,
@@ -20,6 +21,7 @@ from brrp_cli.evaluation.retrieval import (
 from brrp_cli.evaluation.rows import METRICS, STAGES, Row, variant_columns, variant_of
 from brrp_cli.evaluation.score_object import REGIONS
 from brrp_cli.evaluation.variants import Variant
+from brrp_cli.evaluation.written_figures import WrittenFigures, written_figures, written_record
 from brrp_cli.methods.registry import METHODS
 from brrp_cli.reconstruction import FAILED, TOO_FEW_POINTS
 from brrp_cli.seeds import child_rng
@@ -47,6 +49,7 @@ class VariantSummary:
     seconds : stage -> mean over objects; peak_memory_mb : largest
     diagrams : region -> reliability sums (3, bins) of the set
     hits : how often retrieval finds the true object, by visible pixels
+    written : figures of the written meshes, of all objects and by thickness class
     """
 
     variant: Variant
@@ -58,6 +61,7 @@ class VariantSummary:
     peak_memory_mb: float
     diagrams: dict[str, NDArray[np.float64]]
     hits: list[Hits] = field(default_factory=list)
+    written: dict[str, WrittenFigures] = field(default_factory=dict)
 
 
 def summarise(rows: Sequence[Row], variants: Sequence[Variant], seed: int) -> list[VariantSummary]:
@@ -76,8 +80,8 @@ def _one(variant: Variant, rows: list[Row], seed: int) -> VariantSummary:
         rng = child_rng(seed, "bootstrap", f"ece_{region}")
         figures[f"ece_{region}"] = calibration_interval(found, [r["scene"] for r in scored], rng)
         diagrams[region] = np.sum(found, axis=0) if found else np.zeros((3, 0))
-    known = [with_places(row) for row in rows]
-    figures |= {name: _mean(known, name, seed) for name in RETRIEVAL}
+    known = [with_recognition(with_places(row)) for row in rows]
+    figures |= {name: _mean(known, name, seed) for name in (*RETRIEVAL, *RECOGNITION_FIGURES)}
     figures["ece_retrieval"] = retrieval_calibration(rows)
     return VariantSummary(
         variant=variant,
@@ -89,6 +93,7 @@ def _one(variant: Variant, rows: list[Row], seed: int) -> VariantSummary:
         peak_memory_mb=max((row.get("peak_memory_mb") or 0.0 for row in rows), default=math.nan),
         diagrams=diagrams,
         hits=hits_by_pixels(rows),
+        written=written_figures(rows, seed),
     )
 
 
@@ -136,6 +141,7 @@ def as_record(summary: VariantSummary) -> dict[str, Any]:
         "objects": summary.objects,
         "failed": summary.failed,
         "empty": summary.empty,
+        "written": written_record(summary.written, interval_record),
         "metrics": {name: interval_record(i) for name, i in summary.figures.items()},
         "hits": [{k: _json(v) for k, v in _finite(asdict(h)).items()} for h in summary.hits],
         "seconds": {stage: _json(round(s, 4)) for stage, s in summary.seconds.items()},

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, fields, replace
+from dataclasses import dataclass, field, fields, replace
 from itertools import product
 from typing import Any
 
 from brrp_cli.errors import BrrpError
 from brrp_cli.methods.base import Method
+from brrp_cli.methods.config_file import ConfigFile
 from brrp_cli.methods.configuration import as_record
 from brrp_cli.methods.registry import METHODS
 
@@ -21,6 +22,8 @@ class Variant:
     """One way to run. `preset` is None where the method has but one, `k` and `retriever` where it
     has no such thing, `weights` where it was not trained.
 
+    preset : with the name of a configuration file after a + where one changes it
+    changed : the configuration, where a file changes it
     weights : name of what was trained; shift : pixels by which the masks are moved to the right
     """
 
@@ -30,6 +33,7 @@ class Variant:
     retriever: str | None = None
     weights: str | None = None
     shift: int = 0
+    changed: Any = field(default=None, compare=False, repr=False)
 
     @property
     def label(self) -> str:
@@ -47,7 +51,9 @@ class Variant:
     @property
     def config(self) -> Any:
         """The effective configuration of the method."""
-        config = METHODS[self.method].preset(self.preset)
+        config = self.changed
+        if config is None:
+            config = METHODS[self.method].preset(self.preset)
         return config if self.k is None else replace(config, k=self.k)
 
     @property
@@ -77,6 +83,7 @@ def expand(
     retrievers: Sequence[str],
     shifts: Sequence[int],
     weights: Sequence[str] = (),
+    files: Sequence[ConfigFile] = (),
 ) -> list[Variant]:
     """All combinations that mean something, in the order given, each once.
 
@@ -94,11 +101,11 @@ def expand(
         if method.uses_weights and not weights:
             raise BrrpError(f"{name} needs trained weights", fix="pass --weights FILE")
         found += [
-            Variant(name, preset, k, retriever, trained, shift)
-            for preset in _presets(method, presets)
+            Variant(name, preset, k, retriever, trained, shift, config)
+            for preset, config in _configurations(method, presets, files)
             for retriever in (retrievers if method.uses_retriever else [None])
             for trained in (weights if method.uses_weights else [None])
-            for k in _ks(method, preset, ks)
+            for k in _ks(method.preset(preset) if config is None else config, ks)
         ]
     return list(dict.fromkeys(found))
 
@@ -115,9 +122,29 @@ def _presets(method: Method, asked: Sequence[str]) -> list[str | None]:
     return list(known)
 
 
-def _ks(method: Method, preset: str | None, asked: Sequence[int]) -> list[int | None]:
+def _configurations(
+    method: Method, presets: Sequence[str], files: Sequence[ConfigFile]
+) -> list[tuple[str | None, Any]]:
+    """Names of presets, or of presets with the files that change them and what comes of it.
+
+    Errors: BrrpError, ConfigError.
+    """
+    own = [file for file in files if file.method == method.name]
+    if not own:
+        return [(name, None) for name in _presets(method, presets)]
+    names: list[str | None] = [None]
+    if presets and len(method.presets) > 1:
+        names = _presets(method, presets)
+    return [
+        (f"{name or file.preset(method)}+{file.path.stem}", file.config(method, name))
+        for name in names
+        for file in own
+    ]
+
+
+def _ks(config: Any, asked: Sequence[int]) -> list[int | None]:
     """How many objects are retrieved; None where the method's configuration has no `k`."""
-    own = getattr(method.preset(preset), "k", None)
+    own = getattr(config, "k", None)
     return [None] if own is None else list(asked) or [own]
 
 
@@ -130,14 +157,16 @@ def same_results(variants: Sequence[Variant]) -> dict[Variant, Variant]:
 def short_labels(variants: Sequence[Variant]) -> dict[Variant, str]:
     """Labels without what all variants that have it share; unique, since `label` is."""
     varying = {
-        field.name
-        for field in fields(Variant)
-        if len({value for v in variants if (value := getattr(v, field.name)) is not None}) > 1
+        each.name
+        for each in fields(Variant)
+        if each.compare
+        and len({value for v in variants if (value := getattr(v, each.name)) is not None}) > 1
     }
 
     def label(variant: Variant) -> str:
         parts = [variant.method]
-        for name, value in asdict(variant).items():
+        for name in (each.name for each in fields(Variant) if each.compare):
+            value = getattr(variant, name)
             if name in varying - {"method"} and value is not None:
                 parts.append({"k": f"k={value}", "shift": f"shift {value}"}.get(name, str(value)))
         return " ".join(parts)

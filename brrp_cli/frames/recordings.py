@@ -6,7 +6,7 @@ import logging
 from pathlib import Path
 
 from brrp_cli.errors import FrameError
-from brrp_cli.frames.format import Request, pick
+from brrp_cli.frames.format import Format, Request, pick
 from brrp_cli.frames.frame import Frame
 from brrp_cli.frames.images import read_images
 
@@ -14,6 +14,24 @@ log = logging.getLogger(__name__)
 
 COLOUR_ENDINGS = (".png", ".jpg", ".jpeg")
 DEPTH_ENDINGS = (".png", ".tif", ".tiff", ".npy")
+
+
+def recording(title: str, intrinsics: str, unit: str) -> Format:
+    """The format of a folder with color/NAME.jpg, depth/NAME.png, aligned to the colour camera, and
+    the file `intrinsics` of that camera. unit : as in `read_pair`."""
+
+    def read(folder: Path, request: Request) -> Frame:
+        """The frame that --index names or counts, the first else. Errors: FrameError."""
+        colours = images_in(folder / "color", COLOUR_ENDINGS)
+        pairs = by_name(colours, images_in(folder / "depth", DEPTH_ENDINGS))
+        return read_pair(pairs, folder / intrinsics, request, folder, unit)
+
+    return Format(
+        title=title,
+        layout=f"color/, depth/, {intrinsics}",
+        matches=lambda path: (path / intrinsics).is_file() and (path / "color").is_dir(),
+        read=read,
+    )
 
 
 def images_in(folder: Path, endings: tuple[str, ...]) -> dict[str, Path]:

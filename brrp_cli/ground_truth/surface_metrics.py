@@ -17,9 +17,11 @@ from brrp_cli.dependencies import import_open3d
 from brrp_cli.frames.frame import Frame
 from brrp_cli.frames.projection import at_pixels
 from brrp_cli.geometry import normalise
+from brrp_cli.ground_truth.pieces import count_pieces
 from brrp_cli.ground_truth.thickness import thickness_class
-from brrp_cli.ground_truth.true_meshes import ClosedMeshes
+from brrp_cli.ground_truth.true_meshes import ExactMesh
 from brrp_cli.raycast import raycasting_scene
+from brrp_cli.seeds import child_rng
 
 if TYPE_CHECKING:
     import trimesh
@@ -137,14 +139,18 @@ class TrueSurface:
 
 
 def true_surface(
-    meshes: ClosedMeshes, frame: Frame, object_id: int, rng: np.random.Generator
+    exact: ExactMesh, frame: Frame, object_id: int, scene: str, seed: int
 ) -> TrueSurface:
-    """The true surface of an object of `frame` whose meshes are in the camera frame, metres."""
-    surface = MeshSurface(meshes.exact)
+    """The true surface of an object of `frame` whose mesh is in the camera frame, metres.
+
+    scene, seed : decide, with the object, which points are drawn
+    """
+    surface = MeshSurface(exact.mesh)
+    rng = child_rng(seed, "true surface", scene, object_id)
     points, normals = surface.sample(SURFACE_POINTS, rng)
     seen = camera_sees(surface, points, frame, object_id)
     return TrueSurface(
-        surface, frame, object_id, points, normals, seen, meshes.thickness, meshes.pieces
+        surface, frame, object_id, points, normals, seen, exact.thickness, exact.pieces
     )
 
 
@@ -207,6 +213,13 @@ def score_surface(
     }
 
 
+def score_written(
+    mesh: trimesh.Trimesh | None, truth: TrueSurface, scene: str, seed: int
+) -> dict[str, float]:
+    """`score_surface` with the points that scene, object and seed decide."""
+    return score_surface(mesh, truth, child_rng(seed, "written", scene, truth.object_id))
+
+
 def no_surface() -> dict[str, float]:
     """What an object without a mesh scores."""
     zero = (*F_SCORES, *VOLUME_SHARES, "watertight", "pieces", "one_piece")
@@ -214,11 +227,10 @@ def no_surface() -> dict[str, float]:
 
 
 def _solidity(mesh: trimesh.Trimesh, truth: TrueSurface) -> dict[str, float]:
-    from brrp_cli.prior.build.solids import is_solid
-
-    closed = is_solid(mesh)
+    # Every edge has two faces, wound alike, and the volume is above 0.
+    closed = bool(mesh.is_volume)
     ratio = float(mesh.volume / truth.surface.mesh.volume) if closed else float("nan")
-    pieces = int(mesh.body_count)
+    pieces = count_pieces(mesh)
     return {
         "volume_ratio": ratio,
         # Whatever is compared with NaN is false.

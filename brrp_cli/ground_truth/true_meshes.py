@@ -5,7 +5,6 @@ Closing takes seconds a mesh, so that it is done once and kept on disk by the co
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -13,6 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from brrp_cli.files import atomic_path
+from brrp_cli.ground_truth.pieces import count_pieces
 from brrp_cli.ground_truth.thickness import median_thickness
 from brrp_cli.ground_truth.truth import TrueObject, true_mesh
 from brrp_cli.ground_truth.watertight import (
@@ -27,28 +27,47 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
+class ExactMesh:
+    """One object's true mesh, repaired, neither thickened nor smoothed, metres.
+
+    thickness : median, metres; pieces : connected pieces
+    """
+
+    mesh: trimesh.Trimesh
+    thickness: float
+    pieces: int
+
+    def moved(self, T_target_source: np.ndarray) -> ExactMesh:
+        """The same in another frame, by a similarity."""
+        scale = float(np.cbrt(np.linalg.det(T_target_source[:3, :3])))
+        mesh = self.mesh.copy().apply_transform(T_target_source)
+        return ExactMesh(mesh, self.thickness * scale, self.pieces)
+
+
+@dataclass(frozen=True)
 class ClosedMeshes:
     """One object's true mesh, closed in three ways, all in one frame.
 
-    exact : repaired, neither thickened nor smoothed
+    exact : repaired, neither thickened nor smoothed; measured : the same, with its thickness
     for_iou, for_chamfer : as the published tables close it, which thickens thin walls
-    thickness : median over the exact mesh, metres; pieces : connected pieces of it
     """
 
-    exact: trimesh.Trimesh
+    measured: ExactMesh
     for_iou: trimesh.Trimesh
     for_chamfer: trimesh.Trimesh
-    thickness: float = math.nan
-    pieces: int = 1
+
+    @property
+    def exact(self) -> trimesh.Trimesh:
+        """The mesh of `measured`."""
+        return self.measured.mesh
 
     def moved(self, T_target_source: np.ndarray) -> ClosedMeshes:
         """The same in another frame, by a similarity."""
-        exact, for_iou, for_chamfer = (
-            mesh.copy().apply_transform(T_target_source)
-            for mesh in (self.exact, self.for_iou, self.for_chamfer)
+        return ClosedMeshes(
+            self.measured.moved(T_target_source),
+            self.for_iou.copy().apply_transform(T_target_source),
+            self.for_chamfer.copy().apply_transform(T_target_source),
         )
-        scale = float(np.cbrt(np.linalg.det(T_target_source[:3, :3])))
-        return ClosedMeshes(exact, for_iou, for_chamfer, self.thickness * scale, self.pieces)
 
 
 def truth_cache() -> Path:
@@ -64,17 +83,24 @@ def close_truth(true_object: TrueObject, data_root: Path | None, cache: Path) ->
     They are closed in the frame of their file, whose axes decide how the published way thickens.
     Errors: SceneError if the mesh is missing or does not load, MeshError if nothing closes it.
     """
-    mesh = true_mesh(replace(true_object, T_world_object=np.eye(4)), data_root)
-    exact = _repaired(mesh, cache)
-    thickness, pieces = _measured(exact, cache)
+    mesh = _in_its_own_frame(true_object, data_root)
     closed = ClosedMeshes(
-        exact=exact,
+        measured=_measured(_repaired(mesh, cache), cache),
         for_iou=published_truth(mesh, IOU_RESOLUTION, cache),
         for_chamfer=published_truth(mesh, CHAMFER_RESOLUTION, cache),
-        thickness=thickness,
-        pieces=pieces,
     )
     return closed.moved(true_object.T_world_object)
+
+
+def exact_truth(true_object: TrueObject, data_root: Path | None, cache: Path) -> ExactMesh:
+    """The object's exact mesh in world metres. Errors: as `close_truth`."""
+    mesh = _in_its_own_frame(true_object, data_root)
+    return _measured(_repaired(mesh, cache), cache).moved(true_object.T_world_object)
+
+
+def _in_its_own_frame(true_object: TrueObject, data_root: Path | None) -> trimesh.Trimesh:
+    mesh: trimesh.Trimesh = true_mesh(replace(true_object, T_world_object=np.eye(4)), data_root)
+    return mesh
 
 
 def _repaired(mesh: trimesh.Trimesh, cache: Path) -> trimesh.Trimesh:
@@ -92,13 +118,12 @@ def _repaired(mesh: trimesh.Trimesh, cache: Path) -> trimesh.Trimesh:
     return closed
 
 
-def _measured(exact: trimesh.Trimesh, cache: Path) -> tuple[float, int]:
-    """Median thickness in metres, and connected pieces."""
-    kept = cache / f"{content_hash(exact)}-thickness.npz"
+def _measured(mesh: trimesh.Trimesh, cache: Path) -> ExactMesh:
+    kept = cache / f"{content_hash(mesh)}-thickness.npz"
     if kept.exists():
         with np.load(kept, allow_pickle=False) as arrays:
-            return float(arrays["thickness"]), int(arrays["pieces"])
-    thickness, pieces = median_thickness(exact), int(exact.body_count)
+            return ExactMesh(mesh, float(arrays["thickness"]), int(arrays["pieces"]))
+    found = ExactMesh(mesh, median_thickness(mesh), count_pieces(mesh))
     with atomic_path(kept) as partial:
-        np.savez(partial, thickness=thickness, pieces=pieces)
-    return thickness, pieces
+        np.savez(partial, thickness=found.thickness, pieces=found.pieces)
+    return found

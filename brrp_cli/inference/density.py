@@ -56,8 +56,8 @@ def logistic_score(
     """Gradient (P, D) of the mean binary cross-entropy of logits mean + w . phi, without a bias.
 
     weights : (P, D), the first of each, the bias, not used; phi : of n points; labels : (n,);
-    mean : (P, n), a logit of each particle's own; counted : (P, n), 0 for points that have no say
-    in a particle. The first column of the gradient is 0.
+    mean : (P, n), a logit of each particle's own; counted : (P, n), how much each point
+    counts for a particle. The first column of the gradient is 0.
     """
     logits = mean + phi.dot(weights[:, 1:])
     residual = counted * (torch.sigmoid(logits) - labels) / logits.shape[-1]

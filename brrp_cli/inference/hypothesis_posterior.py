@@ -91,6 +91,12 @@ class HypothesisPosterior:
         mine = [isinstance(m, PlacedShape) and m.name == best for m in self.means]
         return int(np.argmax(np.where(mine, self.weights, -1)))
 
+    def object_weight(self, number: int) -> float:
+        """Weight of all placements of the object that hypothesis `number` places."""
+        name = getattr(self.means[number], "name", None)
+        mine = [isinstance(m, PlacedShape) and m.name == name for m in self.means]
+        return float(self.weights[mine].sum())
+
     def logits(self, points: NDArray[np.floating]) -> NDArray[np.float32]:
         """m + w . phi (P, n) at points (n, 3), metres, camera frame."""
         means = np.stack([mean.logits(points) for mean in self.means])

@@ -70,12 +70,13 @@ def infer_correction(
     points = torch.from_numpy((samples.points - center).astype(np.float32)).to(device)
     phi = factors(points, grid)
     targets = torch.from_numpy(samples.targets.astype(np.float32)).to(device)
-    means = np.stack([mean.logits(samples.points) for mean in problem.means])[which]
-    mean = torch.from_numpy(means).to(device)
-    counted = torch.from_numpy(
-        np.stack([_counted(m, samples, problem.noise) for m in problem.means])
-    )
-    counted = counted.to(device)[torch.from_numpy(which).to(device)]
+    logits = [mean.logits(samples.points) for mean in problem.means]
+    counted = [
+        _counted(mean, m, samples, problem.noise, config.contradiction)
+        for mean, m in zip(problem.means, logits, strict=True)
+    ]
+    mean = torch.from_numpy(np.stack(logits)[which]).to(device)
+    counts = torch.from_numpy(np.stack(counted)[which]).to(device)
     stiffness = torch.from_numpy(problem.stiffness[which].astype(np.float32)).to(device)[:, None]
     generator = torch.Generator().manual_seed(child_seed(seed, "correction"))
 
@@ -85,7 +86,7 @@ def infer_correction(
             return norm
         rows = torch.randint(len(targets), (config.batch,), generator=generator).to(device)
         return norm - config.lambda_observed * logistic_score(
-            weights, phi.rows(rows), targets[rows], mean[:, rows], counted[:, rows]
+            weights, phi.rows(rows), targets[rows], mean[:, rows], counts[:, rows]
         )
 
     start = config.start * torch.randn(len(which), grid.dimension, generator=generator)
@@ -103,15 +104,29 @@ def infer_correction(
     return HypothesisPosterior(problem.means, which, shares, correction, problem.box)
 
 
-def _counted(mean: MeanFunction, samples: SoftSamples, noise: float) -> NDArray[np.float32]:
-    """1 for each sample (n,) that has a say, 0 for those of the seen surface that a placed shape
-    explains to within the noise: the placement has been fitted to them, and behind a thin wall they
-    would be taken for its inside."""
+def _counted(
+    mean: MeanFunction,
+    logits: NDArray[np.float32],
+    samples: SoftSamples,
+    noise: float,
+    contradiction: float,
+) -> NDArray[np.float32]:
+    """How much each sample (n,) counts for a hypothesis with `logits` (n,) there: 1, as a rule.
+
+    For a placed shape, 0 for those of the seen surface that it explains to within the noise: the
+    placement has been fitted to them, and behind a thin wall they would be taken for its inside.
+    And `contradiction` for what lies further inside of it than that, and was seen there or seen to
+    be free. Not for what was seen outside of it: masks reach beyond objects more often than objects
+    beyond their shapes.
+    """
     counted = np.ones(len(samples.points), np.float32)
-    seen = np.flatnonzero(np.isfinite(samples.measured[:, 0]))
-    if isinstance(mean, PlacedShape) and len(seen):
+    if isinstance(mean, PlacedShape):
+        measured = np.isfinite(samples.measured[:, 0])
+        seen, free = np.flatnonzero(measured), np.flatnonzero(~measured & (logits > 0))
         distance = mean.signed_distance(samples.measured[seen], noise)
-        counted[seen] = np.abs(distance) > noise
+        counted[seen] = np.where(distance < -noise, contradiction, distance > noise)
+        deep = mean.signed_distance(samples.points[free], noise) < -noise
+        counted[free[deep]] = contradiction
     return counted
 
 

@@ -30,6 +30,8 @@ Array = NDArray[np.float64]
 class PlacedShape:
     """A stored shape where a hypothesis puts it.
 
+    covariance : (6, 6) of a small motion, turn about the shape's origin (radians) and shift
+    (metres), in the camera's axes: how well the frame fixes the placement
     T_cam_shape : (4, 4) similarity from the shape's coordinates; width : metres, scale of the
     logistic function across the surface; limit : of the logit
     """
@@ -41,6 +43,7 @@ class PlacedShape:
     T_cam_shape: Array
     width: float
     limit: float
+    covariance: Array
 
     @property
     def unit(self) -> float:
@@ -64,6 +67,14 @@ class PlacedShape:
         vertices = self.vertices
         return np.stack([vertices.min(axis=0), vertices.max(axis=0)])
 
+    @property
+    def deviations(self) -> Array:
+        """(n,) metres, standard deviation of each vertex along its normal, by the pose alone."""
+        normals = self.normals
+        arms = self.vertices - self.T_cam_shape[:3, 3]
+        rows = np.concatenate([np.cross(arms, normals), normals], axis=1)
+        return np.sqrt(np.einsum("ni,ij,nj->n", rows, self.covariance, rows))
+
     def signed_distance(self, points: NDArray[np.floating], band: float) -> Array:
         """Distance (n,), metres, of points (n, 3), camera frame; exact where it is under `band`."""
         local = transform_points(np.linalg.inv(self.T_cam_shape), np.asarray(points, np.float64))
@@ -81,10 +92,11 @@ class PlacedShape:
         return self.logits(nodes.reshape(-1, 3)).reshape(nodes.shape[:3])
 
     def write(self, group: h5py.Group, shared: SharedParts) -> None:
-        """Attributes name, T_cam_shape (4, 4), width, limit, and shape, the name of the stored
-        shape among what the file's objects share."""
+        """Attributes name, T_cam_shape (4, 4), width, limit, covariance (6, 6), and shape, the name
+        of the stored shape among what the file's objects share."""
         group.attrs.update({"name": self.name, "T_cam_shape": self.T_cam_shape})
         group.attrs.update({"width": self.width, "limit": self.limit})
+        group.attrs["covariance"] = self.covariance
         group.attrs["shape"] = shared.write("shape", self.shape, _write_shape)
 
     @classmethod
@@ -96,6 +108,7 @@ class PlacedShape:
             np.asarray(group.attrs["T_cam_shape"], dtype=np.float64),
             float(group.attrs["width"]),
             float(group.attrs["limit"]),
+            np.asarray(group.attrs["covariance"], dtype=np.float64),
         )
 
 

@@ -25,6 +25,7 @@ def run(frame: Frame, setup: Setup) -> Reconstruction:
     from brrp_cli.methods.brrp_paper import reconstruct_object
     from brrp_cli.methods.each_object import too_few, with_surface
     from brrp_cli.observation.ray_samples import observe
+    from brrp_cli.observation.sensor_noise import wave_deviation
     from brrp_cli.progress import progress
     from brrp_cli.reconstruction import Reconstruction
     from brrp_cli.retrieval.checked import CheckedRetriever
@@ -37,6 +38,9 @@ def run(frame: Frame, setup: Setup) -> Reconstruction:
     workers = setup.workers or cores()
     start = time.perf_counter()
     scene = observe(frame, config.observation, seed, workers)
+    wave = 0.0
+    if config.hypotheses is not None:
+        wave = wave_deviation(frame, scene.plane, config.hypotheses.sensor)
     seconds = {"observation": time.perf_counter() - start}
 
     def one(observation: ObjectObservation) -> ObjectReconstruction:
@@ -45,7 +49,15 @@ def run(frame: Frame, setup: Setup) -> Reconstruction:
                 frame, observation, prior, retriever, config, seed=seed, device=device
             )
         return reconstruct_by_hypotheses(
-            frame, scene.plane, observation, prior, retriever, config, seed=seed, device=device
+            frame,
+            scene.plane,
+            wave,
+            observation,
+            prior,
+            retriever,
+            config,
+            seed=seed,
+            device=device,
         )
 
     def whole(object_id: int) -> ObjectReconstruction:

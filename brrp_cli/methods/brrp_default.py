@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,11 +17,13 @@ from brrp_cli.inference.infer_hypotheses import Problem, SoftSamples, infer_corr
 from brrp_cli.inference.mean_grid import MeanGrid, grid_over
 from brrp_cli.inference.placed_shape import PlacedShape
 from brrp_cli.observation.ray_samples import ObjectObservation
-from brrp_cli.observation.soft_samples import depth_deviation, soft_samples
+from brrp_cli.observation.sensor_noise import depth_deviation
+from brrp_cli.observation.soft_samples import soft_samples
 from brrp_cli.observation.support_plane import Plane
 from brrp_cli.prior.store import Prior
 from brrp_cli.reconstruction import OK, ObjectReconstruction, Retrieved
 from brrp_cli.registration.model import search_model
+from brrp_cli.registration.pose_covariance import pose_covariance
 from brrp_cli.registration.pose_search import Hypothesis, search
 from brrp_cli.registration.scale_scan import observed_cloud
 from brrp_cli.registration.verification import Verifier
@@ -30,10 +33,14 @@ from brrp_cli.timing import timed
 
 Array = NDArray[np.float64]
 
+# The standard deviation of a logistic distribution over its scale.
+LOGISTIC_DEVIATION = np.pi / np.sqrt(3)
+
 
 def reconstruct_by_hypotheses(
     frame: Frame,
     plane: Plane | None,
+    wave: float,
     observation: ObjectObservation,
     prior: Prior,
     retriever: Retriever,
@@ -43,7 +50,10 @@ def reconstruct_by_hypotheses(
     device: str,
 ) -> ObjectReconstruction:
     """Posterior of one object from hypotheses about the k retrieved objects and from the one that
-    it is none of them, each corrected by what was observed."""
+    it is none of them, each corrected by what was observed.
+
+    wave : metres, standard deviation of the mean depth of a patch (observation/sensor_noise.py)
+    """
     hypotheses = config.hypotheses
     assert hypotheses is not None
     seconds: dict[str, float] = {}
@@ -77,7 +87,7 @@ def reconstruct_by_hypotheses(
             shares, [each.alignment_score for each in placed], missing, hypotheses.weigh
         )
         posterior = _infer(
-            observation, frame, plane, placed, weights, hypotheses, seed=seed, device=device
+            observation, frame, plane, wave, placed, weights, hypotheses, seed=seed, device=device
         )
     ends = np.cumsum([0, *(len(group) for group in found)])
     return ObjectReconstruction(
@@ -123,6 +133,7 @@ def _infer(
     observation: ObjectObservation,
     frame: Frame,
     plane: Plane | None,
+    wave: float,
     placed: list[Hypothesis],
     weights: Array,
     config: HypothesesConfig,
@@ -133,7 +144,9 @@ def _infer(
     """Only hypotheses that weigh something cost a mean function."""
     kept = _kept(weights, config.map)
     weights = weights[kept] / weights[kept].sum()
-    shapes = [_placed_shape(placed[i], config.mean) for i in kept if i < len(placed)]
+    shapes = [
+        _placed_shape(placed[i], observation.points, wave, config) for i in kept if i < len(placed)
+    ]
     part = None
     if len(shapes) < len(kept):
         part = visible_part(
@@ -169,16 +182,24 @@ def _kept(weights: Array, config: FittedMapConfig) -> NDArray[np.int64]:
     return np.sort(order[(weights[order] >= config.least_weight) | (np.arange(len(order)) == 0)])
 
 
-def _placed_shape(hypothesis: Hypothesis, config: MeanConfig) -> PlacedShape:
-    """The less the frame says for the placement, the softer its surface."""
-    stored = hypothesis.model.stored
-    return PlacedShape(
-        stored.name,
-        stored.shape,
-        hypothesis.T_cam_object,
-        config.width + config.doubt * max(0.0, config.sure - hypothesis.alignment_score),
-        config.limit,
+def _placed_shape(
+    hypothesis: Hypothesis,
+    observed: NDArray[np.float32],
+    wave: float,
+    config: HypothesesConfig,
+) -> PlacedShape:
+    """The less the frame says for the placement, and the less it fixes its pose, the softer its
+    surface."""
+    stored, mean = hypothesis.model.stored, config.mean
+    covariance = pose_covariance(
+        hypothesis.T_cam_model, hypothesis.model, observed, wave, config.sensor
     )
+    doubt = mean.doubt * max(0.0, mean.sure - hypothesis.alignment_score)
+    shape = PlacedShape(
+        stored.name, stored.shape, hypothesis.T_cam_object, mean.width, mean.limit, covariance
+    )
+    by_pose = float(np.sqrt(np.mean(shape.deviations**2))) / LOGISTIC_DEVIATION
+    return replace(shape, width=float(np.hypot(mean.width, by_pose)) + doubt)
 
 
 def _completed(
@@ -206,10 +227,12 @@ def _retrieved(name: str, probability: float, group: list[Hypothesis], weight: f
     if not group:
         return Retrieved(name, probability, weight=weight)
     best = group[0]
+    T_cam_mesh, _ = best.model.stored.mesh_pose(best.T_cam_object)
     return Retrieved(
         name,
         probability,
         best.T_cam_object,
+        T_cam_mesh,
         best.scale,
         alignment_score=best.alignment_score,
         weight=weight,

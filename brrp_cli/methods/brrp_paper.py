@@ -84,7 +84,7 @@ def _place(
         stored.name,
         probability,
         placement.T_cam_object,
-        placement.scale,
+        *stored.mesh_pose(placement.T_cam_object),
         placement.inliers,
         placement.fitness,
     )

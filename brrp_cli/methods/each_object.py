@@ -35,9 +35,8 @@ def with_surface(
         # A library stumbled: Open3D, SciPy and torch do, over shapes that nobody thought of.
         log.warning("Object %d: an error that brrp does not know: %r", object_id, error)
         log.debug("Object %d", object_id, exc_info=True)
-        return ObjectReconstruction(
-            object_id, FAILED, f"an error that brrp does not know: {error!r}"
-        )
+        message = f"an error that brrp does not know: {error!r} (--verbose shows the traceback)"
+        return ObjectReconstruction(object_id, FAILED, message)
     return result
 
 
@@ -74,7 +73,8 @@ def _check_finite(item: ObjectReconstruction) -> None:
             f"Registration of {found.name}",
             probability=found.probability,
             T_cam_object=found.T_cam_object,
-            scale=found.scale,
+            T_cam_mesh=found.T_cam_mesh,
+            size_factor=found.size_factor,
             fitness=found.fitness,
             alignment_score=found.alignment_score,
             weight=found.weight,

@@ -10,13 +10,9 @@ from brrp_cli.config import SensorConfig
 from brrp_cli.frames.frame import BACKGROUND, Frame
 from brrp_cli.frames.projection import at_pixels, depth_behind
 from brrp_cli.observation.ray_samples import ObjectObservation
+from brrp_cli.observation.sensor_noise import depth_deviation
 
 Array = NDArray[np.float64]
-
-
-def depth_deviation(depth: NDArray[np.floating], config: SensorConfig) -> Array:
-    """Standard deviation (n,), metres, of depth measured at depths (n,), metres."""
-    return np.asarray(config.noise + config.noise_growth * np.asarray(depth, np.float64) ** 2)
 
 
 def soft_samples(

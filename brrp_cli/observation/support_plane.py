@@ -12,9 +12,6 @@ from brrp_cli.dependencies import import_open3d, seeded_open3d
 from brrp_cli.geometry import normalise, similarity
 from brrp_cli.seeds import child_seed
 
-MIN_PLANE_POINTS = 100
-_RANSAC_POINTS = 4_000
-
 
 @dataclass(frozen=True)
 class Plane:
@@ -43,14 +40,19 @@ def fit_plane(
 
     points : (n, 3) background points, metres, camera frame, finite
     toward : (3,) the scene's centre; the normal is turned to its side
-    Returns None where fewer than `MIN_PLANE_POINTS` points are near or agree on a plane.
+    Returns None where fewer than `config.plane_min_points` points are near or agree on a plane.
     """
     near = points[np.linalg.norm(points - toward, axis=-1) < config.plane_radius]
-    if len(near) < MIN_PLANE_POINTS:
+    if len(near) < config.plane_min_points:
         return None
     centred = near.astype(np.float64) - toward
     model = largest_plane(
-        centred, config.plane_tolerance, config.plane_iterations, child_seed(seed, "plane")
+        centred,
+        child_seed(seed, "plane"),
+        tolerance=config.plane_tolerance,
+        iterations=config.plane_iterations,
+        drawn_points=config.plane_ransac_points,
+        min_points=config.plane_min_points,
     )
     if model is None:
         return None
@@ -60,16 +62,22 @@ def fit_plane(
 
 
 def largest_plane(
-    points: NDArray[np.float64], tolerance: float, iterations: int, seed: int
+    points: NDArray[np.float64],
+    seed: int,
+    *,
+    tolerance: float,
+    iterations: int,
+    drawn_points: int,
+    min_points: int,
 ) -> NDArray[np.float64] | None:
     """The plane (4,) a x + b y + c z + d = 0, unit normal, near which most of points (n, 3) lie.
 
-    RANSAC (on `_RANSAC_POINTS` drawn points at most), then least squares on all inliers. None
-    where fewer than `MIN_PLANE_POINTS` points are nearer than `tolerance`.
+    RANSAC (on `drawn_points` at most), then least squares on all inliers. None where fewer than
+    `min_points` points are nearer than `tolerance`, metres.
     """
     drawn = points
-    if len(points) > _RANSAC_POINTS:
-        drawn = points[np.random.default_rng(seed).choice(len(points), _RANSAC_POINTS, False)]
+    if len(points) > drawn_points:
+        drawn = points[np.random.default_rng(seed).choice(len(points), drawn_points, False)]
     o3d = import_open3d()
     cloud = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(drawn))
     # With probability 1 every iteration is run: stopping early depends on which thread is first.
@@ -80,7 +88,7 @@ def largest_plane(
     model = np.asarray(model) / np.linalg.norm(model[:3])
     for _ in range(2):
         inliers = points[np.abs(points @ model[:3] + model[3]) < tolerance]
-        if len(inliers) < MIN_PLANE_POINTS:
+        if len(inliers) < min_points:
             return None
         middle = inliers.mean(axis=0)
         spread = inliers - middle

@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from brrp_cli.completion.completed_mean import empty_space
 from brrp_cli.config import MeanConfig
 from brrp_cli.errors import ResultError
 from brrp_cli.geometry import similarity, transform_points
-from brrp_cli.completion.completed_mean import empty_space
 from brrp_cli.observation.support_plane import Plane
 from brrp_cli.planning.body import Body, body_axes, body_pose, mass_and_inertia
 from brrp_cli.planning.mjcf import Table

@@ -55,3 +55,14 @@ class PriorObject:
     record: dict[str, Any]
     appearance: Appearance
     shape: StoredShape
+
+    def mesh_pose(self, T_cam_object: NDArray[np.float64]) -> tuple[NDArray[np.float64], float]:
+        """The rigid pose (4, 4) of the object's own mesh file, metres, and the factor of its size,
+        for T_cam_object (4, 4), a similarity from normalised coordinates."""
+        scale = float(np.cbrt(np.linalg.det(T_cam_object[:3, :3])))
+        factor = scale / self.half_extent
+        T_cam_mesh = np.eye(4)
+        T_cam_mesh[:3, :3] = T_cam_object[:3, :3] / scale
+        # x_object = (x_mesh - center) / half_extent
+        T_cam_mesh[:3, 3] = T_cam_object[:3, 3] - factor * T_cam_mesh[:3, :3] @ self.center
+        return T_cam_mesh, factor

@@ -56,6 +56,20 @@ class FieldConfig:
 
 
 @dataclass(frozen=True)
+class RepairConfig:
+    """How open meshes are closed; shares of the mesh's diagonal.
+
+    small_hole : a hole whose rim is shorter across is a flaw, not a shape
+    alpha : the wrap's probe enters every opening that is wider; offset : its surface lies so far
+    outside, so that a sheet of 25 cm becomes a wall of 2.5 mm
+    """
+
+    small_hole: float = 0.1
+    alpha: float = 0.02
+    offset: float = 0.005
+
+
+@dataclass(frozen=True)
 class MeshConfig:
     """The mesh that is kept: its faces are divided until no edge is longer than `edge`, a share of
     the largest half-extent, as long as there are no more than `faces` of them."""
@@ -75,6 +89,7 @@ class BuildParameters:
     surface_points: int = 4_000
     dense_points: int = 20_000
     features: FeatureConfig = field(default_factory=FeatureConfig)
+    repair: RepairConfig = field(default_factory=RepairConfig)
     poses: PoseConfig = field(default_factory=PoseConfig)
     appearance: AppearanceConfig = field(default_factory=AppearanceConfig)
     mesh: MeshConfig = field(default_factory=MeshConfig)

@@ -50,6 +50,19 @@ class StoredShape:
         mesh = trimesh.Trimesh(self.vertices, self.faces, process=False)
         return np.asarray(mesh.vertex_normals, dtype=np.float64)
 
+    @cached_property
+    def corners(self) -> NDArray[np.float64]:
+        """(n,) how much further than its faces a vertex has to be moved along its normal: 1 where
+        the surface is flat, 1.7 at the corner of a box, 2.5 at most."""
+        import trimesh
+
+        mesh = trimesh.Trimesh(self.vertices, self.faces, process=False)
+        least = np.ones(len(self.vertices))
+        for corner in mesh.faces.T:
+            along = np.einsum("fi,fi->f", mesh.face_normals, self.normals[corner])
+            np.minimum.at(least, corner, along)
+        return 1 / np.maximum(least, 0.4)
+
     def signed_distance(self, points: NDArray[np.floating], band: float) -> NDArray[np.float64]:
         """Distance (n,) of points (n, 3), negative inside.
 

@@ -10,10 +10,6 @@ from numpy.typing import NDArray
 from brrp_cli.geometry import similarity
 from brrp_cli.prior.objects import PriorObject
 
-# Surface points that the coarse search uses. The stored points come in random order, so that every
-# leading part covers the surface.
-COARSE = 300
-
 
 @dataclass(frozen=True)
 class Model:

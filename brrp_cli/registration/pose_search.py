@@ -15,15 +15,12 @@ from numpy.typing import NDArray
 from brrp_cli.config import FeatureConfig, SearchConfig
 from brrp_cli.geometry import transform_points
 from brrp_cli.registration.initial_poses import feature_matched_poses, resting_initial_poses
-from brrp_cli.registration.model import COARSE, Model
+from brrp_cli.registration.model import Model
 from brrp_cli.registration.scale_scan import ObservedCloud
 from brrp_cli.registration.sdf_refinement import refine_to_sdf
 from brrp_cli.registration.verification import Verifier
 
 Array = NDArray[np.float64]
-
-# The first look at all initial takes one point of so many, and leaves so many times what slides.
-COARSE_SHARE, COARSE_FACTOR = 3, 2
 
 
 @dataclass(frozen=True)
@@ -62,9 +59,11 @@ def search(
         model, observed, features, config.matching, config.matchings, seed
     )
     if verifier.plane is not None:
-        initial += resting_initial_poses(model, verifier.points, verifier.plane, config.turns)
+        initial += resting_initial_poses(model, verifier.points, verifier.plane, config)
     T = np.stack(initial)
-    T, _ = _best(T, model, verifier, config, COARSE_FACTOR * config.coarse, COARSE_SHARE)
+    T, _ = _best(
+        T, model, verifier, config, config.first_factor * config.coarse, config.first_share
+    )
     T, _ = _best(T, model, verifier, config, config.coarse)
     T = _refined(
         T, model, verifier, config.coarse_points, config.coarse_distance, config.coarse_steps
@@ -89,7 +88,7 @@ def _distinct(found: list[Hypothesis], config: SearchConfig) -> list[Hypothesis]
     better one: a ball turned about its middle is one hypothesis, not many."""
     kept: list[Hypothesis] = []
     for each in found:
-        surface = transform_points(each.T_cam_model, each.model.surface[:COARSE])
+        surface = transform_points(each.T_cam_model, each.model.surface[: config.model_points])
         apart = (
             np.abs(other.model.signed_distance(transform_points(T_model_cam, surface))).mean()
             for other in kept
@@ -116,7 +115,7 @@ def _best(
         T_cam_model,
         model,
         config.alignment_score,
-        model_points=COARSE // share,
+        model_points=config.model_points // share,
         seen_points=config.seen_points // share,
     )
     order = np.argsort(-score, kind="stable")[:count]

@@ -64,7 +64,9 @@ def _step(points: NDArray[np.float32], model: Model, distance: float, resize: bo
         rows[i] = p[j] * slope[k] - p[k] * slope[j]
     rows[3:6] = slope
     if resize:
-        rows[6] = (p * slope).sum(axis=0)
+        # Distances count in metres of the camera frame: in the model's, which shrink as it is taken
+        # to be larger, every noise would make it so.
+        rows[6] = (p * slope).sum(axis=0) - value * pulls
     rows = np.ascontiguousarray(rows.reshape(unknowns, batch, count).swapaxes(0, 1))
     normal = (rows @ rows.mT).astype(np.float64)
     fall = rows @ value.reshape(batch, count, 1)

@@ -19,6 +19,7 @@ from brrp_cli.surface.colours import (
     spread_label,
     spread_meaning,
 )
+from brrp_cli.surface.painting import surface_colours
 
 Picture = NDArray[np.uint8]
 
@@ -49,11 +50,8 @@ def preview(
     behind = fitted(view_from_behind(view, _middle(objects), up), surfaces)
     top = scale_top(surfaces)
     unsure = [spread_colours(spread(s), top) for s in surfaces]
-    colours = object_colours(frame.object_ids)
     shapes = [
-        np.tile(colours[o.object_id], (len(o.surface.vertices), 1))
-        for o in found
-        if o.surface is not None
+        surface_colours(o.surface, frame, o.object_id) for o in found if o.surface is not None
     ]
     masks = draw_masks(frame.rgb, frame.segmap)
     meaning = spread_meaning(surfaces)

@@ -103,6 +103,7 @@ class StoredResult:
             np.asarray(mesh.faces, dtype=np.int64),
             np.asarray(values, dtype=np.float32).reshape(-1),
             unit,
+            _colours(mesh),
         )
 
 
@@ -195,6 +196,16 @@ def _numbers(value: Any, shape: tuple[int, ...]) -> NDArray[np.float64]:
 def _text(value: Any) -> None:
     if not isinstance(value, str):
         raise TypeError(f"{value!r:.60} is no text")
+
+
+def _colours(mesh: trimesh.Trimesh) -> NDArray[np.uint8]:
+    """RGB (n, 3) of a mesh's vertices; grey where the file has none."""
+    from trimesh.visual import ColorVisuals
+
+    visual = mesh.visual
+    if not isinstance(visual, ColorVisuals):
+        return np.full((len(mesh.vertices), 3), 128, np.uint8)
+    return np.asarray(visual.vertex_colors, dtype=np.uint8)[:, :3]
 
 
 def _read_mesh(path: Path) -> trimesh.Trimesh:

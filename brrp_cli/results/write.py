@@ -24,7 +24,7 @@ from brrp_cli.reconstruction import (
 )
 from brrp_cli.rendering.preview import preview
 from brrp_cli.results.posterior_file import save_posteriors
-from brrp_cli.surface.colours import scale_top, spread, spread_colours
+from brrp_cli.surface.painting import surface_colours
 from brrp_cli.version import __version__
 
 if TYPE_CHECKING:
@@ -112,16 +112,15 @@ def T_frame_cam(seen: Frame, frame: str) -> NDArray[np.float64]:
 def _meshes(
     result: Reconstruction, T_target_cam: NDArray[np.float64]
 ) -> dict[int, trimesh.Trimesh]:
-    """Meshes by object id, with uncertainty as colour and as a scalar of each vertex."""
+    """Meshes by object id, in colour, with uncertainty as a scalar of each vertex."""
     import trimesh
 
     found = [(o.object_id, o.surface) for o in result.objects if o.surface is not None]
-    top = scale_top([surface for _, surface in found])
     return {
         object_id: trimesh.Trimesh(
             transform_points(T_target_cam, surface.vertices),
             surface.faces,
-            vertex_colors=spread_colours(spread(surface), top),
+            vertex_colors=surface_colours(surface, result.frame, object_id),
             vertex_attributes={"uncertainty": surface.uncertainty.astype(np.float32)},
             process=False,
         )
@@ -166,6 +165,7 @@ def result_record(result: Reconstruction, frame: str) -> dict[str, Any]:
         "objects": [_object_record(o, T_target_cam) for o in result.objects],
         "seconds": _rounded(result.seconds),
         "config": result.configuration,
+        "segmentation": result.segmentation,
         "versions": _versions(),
     }
 
@@ -178,6 +178,7 @@ def _object_record(item: ObjectReconstruction, T_target_cam: NDArray[np.float64]
         "points": item.n_points,
         "mesh": None if item.surface is None else mesh_name(item.object_id),
         **({} if item.surface is None else _surface_record(item.surface, T_target_cam)),
+        "recognised": None if item.recognised is None else item.recognised.name,
         "not_in_prior": item.unknown_probability,
         "weight_not_in_prior": item.unknown_weight,
         "retrieved": [_retrieved_record(r, T_target_cam) for r in item.retrieved],
@@ -199,17 +200,18 @@ def _surface_record(surface: Surface, T_target_cam: NDArray[np.float64]) -> dict
 
 
 def _retrieved_record(found: Retrieved, T_target_cam: NDArray[np.float64]) -> dict[str, Any]:
-    """`T_frame_object` is a similarity from the stored object's normalised coordinates."""
-    placed = found.T_cam_object
+    """`T_cam_mesh` and `T_frame_mesh` are rigid, from the mesh file times `size_factor`, metres."""
+    placed = found.T_cam_mesh
     return {
         "name": found.name,
         "probability": found.probability,
-        "scale": found.scale,
+        "size_factor": found.size_factor,
         "inliers": found.inliers,
         "fitness": found.fitness,
         "alignment_score": found.alignment_score,
         "weight": found.weight,
-        "T_frame_object": None if placed is None else (T_target_cam @ placed).tolist(),
+        "T_cam_mesh": None if placed is None else placed.tolist(),
+        "T_frame_mesh": None if placed is None else (T_target_cam @ placed).tolist(),
     }
 
 

@@ -3,7 +3,7 @@
 Stored objects were looked at from all around when the prior was built. What is seen of an object is
 compared with every stored view in many lights, and with the stored object's size in its resting
 poses. Probabilities need not sum to 1: the rest is the probability that the prior does not hold the
-object. The constants that turn likeness into probability are in score_fusion.py.
+object. The numbers are in brrp_cli/config/retrieval.py.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from brrp_cli.retrieval.illuminants import lights, local_lights, log_prior
 from brrp_cli.retrieval.observed_appearance import see_object
 from brrp_cli.retrieval.score_fusion import Similarity, believe
 from brrp_cli.retrieval.shortlist import Shortlist
-from brrp_cli.retrieval.similarity import evidence, lit_histograms
+from brrp_cli.retrieval.similarity import lit_histograms, similarity
 
 
 class AppearanceRetriever:
@@ -35,12 +35,13 @@ class AppearanceRetriever:
 
     def __init__(self, prior: Prior, config: Config, seed: int) -> None:
         self._looks = prior.appearance
-        self._shortlist = Shortlist(self._looks.first)
         self._config = config
+        own = config.retrieval
+        self._shortlist = Shortlist(self._looks.first, own)
         self._seed = seed
-        self._gains = lights()
-        self._light = log_prior(self._gains)
-        self._local = local_lights(self._gains)
+        self._gains = lights(own.illuminants)
+        self._light = log_prior(self._gains, own.illuminants)
+        self._local = local_lights(self._gains, own.illuminants)
         self._frame: Frame | None = None
         self._answers: dict[int, NDArray[np.float64]] = {}
 
@@ -48,7 +49,13 @@ class AppearanceRetriever:
         """P(c|R) (n,) for one object of the frame, in the order of the prior's names; sum <= 1."""
         if frame is not self._frame:
             found = self.evidence(frame)
-            answers = believe(list(found.values()), self._light, self._local, len(self._looks))
+            answers = believe(
+                list(found.values()),
+                self._light,
+                self._local,
+                len(self._looks),
+                self._config.retrieval.fusion,
+            )
             self._answers = dict(zip(found, answers, strict=True))
             self._frame = frame
         if object_id not in self._answers:
@@ -62,14 +69,16 @@ class AppearanceRetriever:
 
     def evidence(self, frame: Frame) -> dict[int, Similarity]:
         """How alike every object of the frame is to the stored ones, by id."""
-        plane = self.plane(frame)
+        plane, own = self.plane(frame), self._config.retrieval
         found = {}
         for object_id in frame.object_ids:
-            seen = see_object(frame, object_id, plane)
+            seen = see_object(frame, object_id, plane, own.observed)
             histograms = lit_histograms(seen, self._gains)
             rows = self._shortlist.rows(seen, histograms)
             stored = self._looks.rows(rows)
-            found[object_id] = evidence(seen, histograms, stored, rows, len(self._gains))
+            found[object_id] = similarity(
+                seen, histograms, stored, rows, len(self._gains), own.similarity
+            )
         return found
 
     def plane(self, frame: Frame) -> Plane | None:

@@ -38,12 +38,6 @@ def unknown(probabilities: NDArray[np.floating]) -> float:
     return min(missing, 1.0) if missing > 1e-9 else 0.0
 
 
-def softmax(scores: NDArray[np.floating]) -> NDArray[np.float64]:
-    """exp(scores) / sum exp(scores) for scores (n,), finite or -inf, at least one finite."""
-    weights = np.exp(np.asarray(scores, dtype=np.float64) - np.max(scores))
-    return np.asarray(weights / weights.sum(), dtype=np.float64)
-
-
 def top_k(
     probabilities: NDArray[np.floating], names: Sequence[str], k: int
 ) -> list[tuple[str, float]]:

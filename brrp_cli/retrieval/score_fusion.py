@@ -21,27 +21,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-# Likeness where it cannot be judged, as with a mesh without colours: about what an object that is
-# rightly found has.
-NEUTRAL_COLOUR = 0.93
-NEUTRAL_PAIRS = 0.97
-
-
-@dataclass(frozen=True)
-class Weights:
-    """See above; each likeness's inverse temperature, and the offset of the log odds."""
-
-    colour: float
-    pairs: float
-    size: float
-    offset: float
-
-
-# Fitted by tools/fit_appearance.py on made scenes of 50 YCB objects of the prior (30), of 7 others
-# (10) and of random shapes (10), seed 3000:
-#   python tools/make_scenes.py --meshes MESHES --noise structured-light --light varied --seed 3000
-#   python tools/fit_appearance.py --prior prior/ fit_prior/ fit_unseen/ fit_other/
-WEIGHTS = Weights(colour=24.26, pairs=25.27, size=0.44, offset=9.88)
+from brrp_cli.config.retrieval import FusionConfig
 
 
 @dataclass(frozen=True)
@@ -64,7 +44,7 @@ def believe(
     light: NDArray[np.floating],
     local: NDArray[np.floating],
     count: int,
-    weights: Weights = WEIGHTS,
+    weights: FusionConfig,
 ) -> list[NDArray[np.float64]]:
     """P(c|R) (count,) for each seen object of one frame; what is missing from 1 is P(none|R).
 
@@ -86,7 +66,7 @@ def believe(
     return found
 
 
-def _log_odds(item: Similarity, count: int, weights: Weights) -> NDArray[np.float64]:
+def _log_odds(item: Similarity, count: int, weights: FusionConfig) -> NDArray[np.float64]:
     shape = weights.pairs * (1 - item.hidden) * (item.pairs - 1) + weights.size * item.size
     colour = weights.colour * (item.colour.astype(np.float64) - 1)
     return np.asarray(weights.offset + colour + shape - np.log(count))

@@ -7,48 +7,46 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from brrp_cli.config.retrieval import SimilarityConfig
 from brrp_cli.descriptors.colour_histogram import colour_histograms
 from brrp_cli.descriptors.descriptor import roots
 from brrp_cli.retrieval.observed_appearance import SeenObject
-from brrp_cli.retrieval.score_fusion import NEUTRAL_COLOUR, NEUTRAL_PAIRS, Similarity
-
-# Sizes differ by this much without meaning anything: metres for height and both sides of the
-# footprint, and a share of the stored one.
-SIZE_SPREAD = np.array([0.006, 0.008, 0.008], dtype=np.float32)
-SIZE_SHARE = np.float32(0.06)
-# Being smaller than the stored object, against being larger: a footprint is seen from one side.
-SMALLER = np.array([1.0, 0.15, 0.15], dtype=np.float32)
-# Squared spreads beyond which nothing more speaks against a size.
-SIZE_LIMIT = np.float32(16.0)
+from brrp_cli.retrieval.score_fusion import Similarity
 
 
 def colour_likeness(
-    histograms: NDArray[np.floating] | None, stored: NDArray[np.uint8], lights: int
+    histograms: NDArray[np.floating] | None,
+    stored: NDArray[np.uint8],
+    lights: int,
+    config: SimilarityConfig,
 ) -> NDArray[np.float32]:
     """Bhattacharyya coefficient (g, m) of the most similar view, for histograms (g, b) of what is
     seen in g lights and stored views (m, v, b). Neutral where either has no colours."""
     count, views, bins = stored.shape
     if histograms is None:
-        return np.full((lights, count), NEUTRAL_COLOUR, np.float32)
+        return np.full((lights, count), config.neutral_colour, np.float32)
     seen = np.sqrt(histograms, dtype=np.float32)
     alike = seen @ roots(stored.reshape(count * views, bins)).T
     found = np.asarray(alike.reshape(len(seen), count, views).max(axis=-1))
-    found[:, ~stored.any(axis=(1, 2))] = NEUTRAL_COLOUR
+    found[:, ~stored.any(axis=(1, 2))] = config.neutral_colour
     return found
 
 
 def pair_likeness(
-    histogram: NDArray[np.floating] | None, stored: NDArray[np.uint8]
+    histogram: NDArray[np.floating] | None, stored: NDArray[np.uint8], config: SimilarityConfig
 ) -> NDArray[np.float32]:
     """The same (m,) for the histogram over point pairs (b,) and stored views (m, v, b)."""
     if histogram is None:
-        return np.full(len(stored), NEUTRAL_PAIRS, np.float32)
+        return np.full(len(stored), config.neutral_pairs, np.float32)
     alike = roots(stored) @ np.sqrt(histogram, dtype=np.float32)
     return np.asarray(alike.max(axis=-1))
 
 
 def size_penalty(
-    size: NDArray[np.floating] | None, stored: NDArray[np.float32], hidden: float
+    size: NDArray[np.floating] | None,
+    stored: NDArray[np.float32],
+    hidden: float,
+    config: SimilarityConfig,
 ) -> NDArray[np.float32]:
     """What speaks against the size (m,), 0 or less, in the resting pose that fits best.
 
@@ -58,27 +56,31 @@ def size_penalty(
     """
     if size is None:
         return np.zeros(len(stored), np.float32)
-    spread = SIZE_SPREAD + SIZE_SHARE * stored
+    allowed = np.array(config.size_spread, dtype=np.float32)
+    spread = allowed + np.float32(config.size_share) * stored
+    limit = np.float32(config.size_limit)
     off = (size.astype(np.float32) - stored) / spread
-    larger = np.minimum(np.maximum(off, 0) ** 2, SIZE_LIMIT)
-    smaller = np.minimum(np.maximum(-off, 0) ** 2 * SMALLER, SIZE_LIMIT)
+    larger = np.minimum(np.maximum(off, 0) ** 2, limit)
+    weight = np.array(config.smaller, dtype=np.float32)
+    smaller = np.minimum(np.maximum(-off, 0) ** 2 * weight, limit)
     against = (larger + np.float32((1 - hidden) ** 2) * smaller).sum(axis=-1)
     return np.asarray(-np.nanmin(against, axis=-1) / 2, dtype=np.float32)
 
 
-def evidence(
+def similarity(
     seen: SeenObject,
     histograms: NDArray[np.floating] | None,
     stored: NDArray[Any],
     rows: NDArray[np.int64],
     lights: int,
+    config: SimilarityConfig,
 ) -> Similarity:
     """All of it for stored descriptors (m,), which are those of the rows (m,) of the prior."""
     return Similarity(
         rows=rows,
-        colour=colour_likeness(histograms, stored["colour"], lights),
-        pairs=pair_likeness(seen.pairs, stored["pairs"]),
-        size=size_penalty(seen.size, stored["sizes"], seen.hidden),
+        colour=colour_likeness(histograms, stored["colour"], lights, config),
+        pairs=pair_likeness(seen.pairs, stored["pairs"], config),
+        size=size_penalty(seen.size, stored["sizes"], seen.hidden, config),
         hidden=seen.hidden,
     )
 

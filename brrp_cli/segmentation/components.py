@@ -5,41 +5,43 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from brrp_cli.config.segmentation import ComponentsConfig
 from brrp_cli.dependencies import import_library
 
-_CALM = 0.3  # of boundary, at most, in the middle of a part
-_MIN_CORE = 30  # pixels
-_MIN_BORDER = 4  # pixels
-_MEET = 0.45  # of the border, a crease
-_NECK = 0.35  # of the smaller part's width
 
-
-def find_parts(mask: NDArray[np.bool_], boundary: NDArray[np.float64]) -> NDArray[np.int64]:
+def find_parts(
+    mask: NDArray[np.bool_], boundary: NDArray[np.float64], config: ComponentsConfig
+) -> NDArray[np.int64]:
     """Labels (H, W), 1, 2, ..., of parts of the mask: each grows from a calm middle to the ridges
     of the boundary (H, W), 0 to 1. What holds no calm middle is one part if it hangs together, and
     0 if it is smaller than that too."""
     ndimage = import_library("scipy.ndimage")
     segmentation = import_library("skimage.segmentation")
-    calm = mask & (boundary < _CALM)
+    calm = mask & (boundary < config.calm)
     # A bridge of one or two pixels between things is noise.
-    cores = _large(ndimage.label(ndimage.binary_erosion(calm, border_value=1))[0])
+    cores = _large(
+        ndimage.label(ndimage.binary_erosion(calm, border_value=1))[0], config.least_core
+    )
     # Thin things have no pixel that is far from an edge, and are whole parts of the mask.
     whole, _ = ndimage.label(mask, structure=np.ones((3, 3)))
     holding = np.unique(whole[cores > 0])
-    thin = _large(np.where(np.isin(whole, holding), 0, whole))
+    thin = _large(np.where(np.isin(whole, holding), 0, whole), config.least_core)
     markers = np.where(thin > 0, thin + cores.max(), cores)
     grown = segmentation.watershed(boundary, markers, mask=mask)
     return np.asarray(grown, dtype=np.int64)
 
 
 def join_parts(
-    parts: NDArray[np.int64], boundary: NDArray[np.float64], threshold: float
+    parts: NDArray[np.int64],
+    boundary: NDArray[np.float64],
+    threshold: float,
+    config: ComponentsConfig,
 ) -> NDArray[np.int64]:
     """Labels (H, W) after neighbours whose common border is mostly no boundary were joined, unless
     the border is but a neck between two wide parts."""
     border, length = _borders(parts, boundary)
     width = _widths(parts, len(length))
-    neck = np.maximum(_MIN_BORDER, _NECK * np.minimum(width, width[:, None]))
+    neck = np.maximum(config.least_border, config.neck * np.minimum(width, width[:, None]))
     return relabel(parts, (length >= neck) & (border < threshold * length))
 
 
@@ -61,10 +63,12 @@ def split_at_strongest(
     return parts
 
 
-def contacts(parts: NDArray[np.int64], crease: NDArray[np.float64]) -> NDArray[np.bool_]:
+def contacts(
+    parts: NDArray[np.int64], crease: NDArray[np.float64], config: ComponentsConfig
+) -> NDArray[np.bool_]:
     """(n + 1, n + 1) whether two parts meet in a hollow crease (H, W), 0 to 1."""
     border, length = _borders(parts, crease)
-    touch = (length >= _MIN_BORDER) & (border > _MEET * length)
+    touch = (length >= config.least_border) & (border > config.meet * length)
     return np.asarray(touch | touch.T)
 
 
@@ -128,6 +132,6 @@ def _widths(parts: NDArray[np.int64], count: int) -> NDArray[np.float64]:
     return width
 
 
-def _large(labels: NDArray[np.integer]) -> NDArray[np.int64]:
-    small = np.bincount(labels.ravel()) < _MIN_CORE
+def _large(labels: NDArray[np.integer], least: int) -> NDArray[np.int64]:
+    small = np.bincount(labels.ravel()) < least
     return np.where(small[labels], 0, labels).astype(np.int64)

@@ -9,20 +9,14 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from brrp_cli.config.segmentation import ConcaveEdgesConfig
+
 Array = NDArray[np.float64]
 
-_REACH = 4  # pixels to each side, across which a crease is looked for
-_NORMAL_STEP = 2
-# Degrees between the normals of both sides: no crease, and surely one.
-_FLAT, _SHARP = 30.0, 60.0
-_NEAR = 0.05  # metres; sides farther apart are two surfaces, whatever their normals
-_STEEP = 6.0
-_JUMP = 0.008
 
-
-def surface_normals(points: Array) -> Array:
+def surface_normals(points: Array, config: ConcaveEdgesConfig) -> Array:
     """Unit normals (H, W, 3), toward the camera, of points (H, W, 3); NaN beside missing ones."""
-    step = _NORMAL_STEP
+    step = config.normal_step
     padded = np.pad(points, ((step, step), (step, step), (0, 0)), constant_values=np.nan)
     across = padded[step:-step, 2 * step :] - padded[step:-step, : -2 * step]
     down = padded[2 * step :, step:-step] - padded[: -2 * step, step:-step]
@@ -32,20 +26,21 @@ def surface_normals(points: Array) -> Array:
     return normals
 
 
-def hollow_creases(points: Array, normals: Array) -> Array:
+def hollow_creases(points: Array, normals: Array, config: ConcaveEdgesConfig) -> Array:
     """(H, W) from 0, none, to 1, a sharp hollow crease of points (H, W, 3), metres, at the pixel.
 
     normals : (H, W, 3) unit, toward the camera
     """
     height, width = points.shape[:2]
-    pad = ((_REACH, _REACH), (_REACH, _REACH), (0, 0))
+    reach = config.reach
+    pad = ((reach, reach), (reach, reach), (0, 0))
     all_points = np.pad(points, pad, constant_values=np.nan)
     all_normals = np.pad(normals, pad, constant_values=np.nan)
     crease = np.zeros((height, width))
-    for down, right in ((0, _REACH), (_REACH, 0), (3, 3), (3, -3)):
+    for down, right in ((0, reach), (reach, 0), (3, 3), (3, -3)):
         sides = []
         for sign in (1, -1):
-            row, column = _REACH + sign * down, _REACH + sign * right
+            row, column = reach + sign * down, reach + sign * right
             window = np.s_[row : row + height, column : column + width]
             sides.append((all_points[window], all_normals[window]))
         (first, first_normal), (second, second_normal) = sides
@@ -53,13 +48,13 @@ def hollow_creases(points: Array, normals: Array) -> Array:
         with np.errstate(invalid="ignore"):
             cosine = np.clip(np.sum(first_normal * second_normal, axis=-1), -1, 1)
             hollow = np.sum((first_normal - second_normal) * between, axis=-1) < 0
-            near = np.linalg.norm(between, axis=-1) < _NEAR
-            sharp = (np.degrees(np.arccos(cosine)) - _FLAT) / (_SHARP - _FLAT)
+            near = np.linalg.norm(between, axis=-1) < config.near
+            sharp = (np.degrees(np.arccos(cosine)) - config.flat) / (config.sharp - config.flat)
         crease = np.maximum(crease, np.where(hollow & near, np.nan_to_num(sharp), 0.0))
     return np.clip(crease, 0.0, 1.0)
 
 
-def depth_jumps(depth: Array, K: Array) -> NDArray[np.bool_]:
+def depth_jumps(depth: Array, K: Array, config: ConcaveEdgesConfig) -> NDArray[np.bool_]:
     """(H, W) pixels beside which depth (H, W), metres, jumps: steeper than a surface is seen."""
     jumps = np.zeros(depth.shape, dtype=bool)
     for axis, focal in ((0, K[1, 1]), (1, K[0, 0])):
@@ -67,7 +62,7 @@ def depth_jumps(depth: Array, K: Array) -> NDArray[np.bool_]:
         marked = np.moveaxis(jumps, axis, 0)
         with np.errstate(invalid="ignore"):
             width = np.minimum(near[1:], near[:-1]) / focal
-            steep = np.abs(near[1:] - near[:-1]) > np.maximum(_STEEP * width, _JUMP)
+            steep = np.abs(near[1:] - near[:-1]) > np.maximum(config.steep * width, config.jump)
         marked[1:] |= steep
         marked[:-1] |= steep
     return jumps

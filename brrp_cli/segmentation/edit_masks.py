@@ -8,6 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from brrp_cli.config.segmentation import SegmentConfig
 from brrp_cli.dependencies import import_library
 from brrp_cli.errors import FrameError
 from brrp_cli.frames.frame import BACKGROUND, Frame
@@ -32,7 +33,13 @@ def drop(frame: Frame, ids: Sequence[int]) -> NDArray[np.int64]:
     return np.where(np.isin(frame.segmap, list(ids)), BACKGROUND, frame.segmap)
 
 
-def split(frame: Frame, object_id: int, pieces: int = 2, seed: int = 0) -> NDArray[np.int64]:
+def split(
+    frame: Frame,
+    object_id: int,
+    pieces: int = 2,
+    seed: int = 0,
+    config: SegmentConfig | None = None,
+) -> NDArray[np.int64]:
     """Masks (H, W) in which an object is that many; new ones have ids above all others, the
     largest keeps its own.
 
@@ -44,11 +51,13 @@ def split(frame: Frame, object_id: int, pieces: int = 2, seed: int = 0) -> NDArr
     if mask.sum() < pieces:
         raise FrameError("The object has too few points with depth", where=frame.source)
     raw = np.where(frame.valid, frame.points[..., 2], np.nan)
-    depth = smooth_depth(np.where(flying_pixels(raw), np.nan, raw))
+    config = config or SegmentConfig()
+    smoothing, edges = config.smooth_depth, config.concave_edges
+    depth = smooth_depth(np.where(flying_pixels(raw, smoothing), np.nan, raw), smoothing)
     points = backproject(depth, frame.K).astype(np.float64)
-    crease = hollow_creases(points, surface_normals(points))
-    boundary = np.maximum(crease, depth_jumps(depth, frame.K))
-    parts = split_at_strongest(find_parts(mask, boundary), boundary, pieces)
+    crease = hollow_creases(points, surface_normals(points, edges), edges)
+    boundary = np.maximum(crease, depth_jumps(depth, frame.K, edges))
+    parts = split_at_strongest(find_parts(mask, boundary, config.components), boundary, pieces)
     if len(np.unique(parts[parts > 0])) < pieces:
         log.info("Object %d has no such boundary inside: it is cut by nearness", object_id)
         parts = _by_nearness(frame, mask, pieces, seed)

@@ -7,23 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from brrp_cli.config.segmentation import FootprintsConfig, SegmentConfig
 from brrp_cli.segmentation.components import contacts, relabel
 from brrp_cli.segmentation.merge_by_colour import same_hue, vivid_hues
 from brrp_cli.segmentation.table_plane import convex_hull, in_hull
 
 Array = NDArray[np.float64]
-
-_CELL = 0.003
-# Mean cosine to the middle: of an inside that shares the footprint, and of walls of which one is
-# seen from within and one from without (of a round one 0.9).
-_INWARD, _FACING = 0.3, 0.7
-_ROUND = 0.35  # of both footprints, that the hull around them may hold besides
-_ABOVE = 0.02  # metres by which an inside may rise over its outside
-_SAME_RANGE = 0.3
-_STANDS = 0.04  # metres; what is nowhere lower does not stand on the table
-_OVER = 0.4  # of the smaller footprint, shared by what hangs on something and that
-_PIECES = 0.25  # of the smaller footprint, shared by pieces of one thing
-_COLOURED = 0.15  # of the smaller footprint, shared by pieces of one vivid colour
 
 
 @dataclass(frozen=True)
@@ -51,29 +40,30 @@ def join_on_one_spot(
     plan_normals: Array,
     crease: Array,
     rgb: NDArray[np.uint8],
-    overlap: float,
+    config: SegmentConfig,
 ) -> NDArray[np.int64]:
     """Labels (H, W) in which parts that belong together, though something lies between them in the
     image, have one label.
 
     Parts that meet in a hollow crease are two things, unless the upper one neither stands on the
     table nor lies over the lower one: a handle, the body of a drill. Of parts that do not, whose
-    footprints share `overlap` of the smaller one, one may be the inside of the other: it faces the
-    other's middle, as the far wall of a mug does. Or both are pieces of one thing, at one height.
-    Parts of one vivid colour that share some of their footprints are one thing however they meet:
-    the studs of a brick.
+    footprints share `config.overlap` of the smaller one, one may be the inside of the other: it
+    faces the other's middle, as the far wall of a mug does. Or both are pieces of one thing, at one
+    height. Parts of one vivid colour that share some of their footprints are one thing however they
+    meet: the studs of a brick.
 
     plan : (H, W, 2) plan coordinates, height : (H, W) above the table, metres; plan_normals :
     (H, W, 2) the normals' part in the plan; crease : (H, W) hollow creases that are no jumps of
     depth, 0 to 1; rgb : (H, W, 3)
     """
+    own = config.footprints
     count = int(parts.max()) + 1
     standing = {
-        int(i): _standing(parts == i, plan, height, plan_normals)
+        int(i): _standing(parts == i, plan, height, plan_normals, own.cell)
         for i in np.unique(parts[parts > 0])
     }
-    touch = contacts(parts, crease)
-    hues = vivid_hues(parts, rgb)
+    touch = contacts(parts, crease, config.components)
+    hues = vivid_hues(parts, rgb, config.vivid_colour)
     same = np.zeros((count, count), dtype=bool)
     for i, first in standing.items():
         for j, second in standing.items():
@@ -83,25 +73,27 @@ def join_on_one_spot(
                 continue
             shared = len(first.cells & second.cells) / min(len(first.cells), len(second.cells))
             if touch[i, j]:
-                pieces = shared > _OVER and _hangs(first, second)
+                pieces = shared > own.over and _hangs(first, second, own)
             else:
-                pieces = shared > _PIECES and _at_one_height(first, second)
-            inward = max(_inward(first, second), _inward(second, first))
-            inside = inward > _INWARD and shared > overlap
-            coloured = shared > _COLOURED and same_hue(hues[i], hues[j])
-            walls = _walls(first, second) or _walls(second, first)
+                pieces = shared > own.pieces and _at_one_height(first, second, own)
+            inward = max(_inward(first, second, own), _inward(second, first, own))
+            inside = inward > own.inward and shared > config.overlap
+            coloured = shared > own.coloured and same_hue(hues[i], hues[j], config.vivid_colour)
+            walls = _walls(first, second, own) or _walls(second, first, own)
             same[i, j] = pieces or inside or coloured or walls
     return relabel(parts, same)
 
 
-def _standing(mask: NDArray[np.bool_], plan: Array, height: Array, normals: Array) -> Standing:
-    cells = _filled(np.unique(np.floor(plan[mask] / _CELL).astype(np.int64), axis=0))
+def _standing(
+    mask: NDArray[np.bool_], plan: Array, height: Array, normals: Array, cell: float
+) -> Standing:
+    cells = _filled(np.unique(np.floor(plan[mask] / cell).astype(np.int64), axis=0))
     bottom, top = np.percentile(height[mask], (5, 95))
     known = mask & np.isfinite(normals).all(axis=-1)
     return Standing(
         cells=frozenset((int(a), int(b)) for a, b in cells),
         box=(cells.min(axis=0), cells.max(axis=0)),
-        middle=(cells.mean(axis=0) + 0.5) * _CELL,
+        middle=(cells.mean(axis=0) + 0.5) * cell,
         plan=plan[known],
         normals=normals[known],
         low=float(bottom),
@@ -134,13 +126,13 @@ def _gap(first: Standing, second: Standing) -> float:
     return len(_filled(both)) / len(both) - 1.0
 
 
-def _inward(inner: Standing, outer: Standing) -> float:
+def _inward(inner: Standing, outer: Standing, config: FootprintsConfig) -> float:
     """How much the steep surface of `inner` faces the middle of both: 1 all of it, -1 away. 0 where
     it rises above `outer`."""
-    if inner.high > outer.high + _ABOVE:
+    if inner.high > outer.high + config.above:
         return 0.0
     both = np.array(sorted(inner.cells | outer.cells), dtype=np.float64)
-    toward = (both.mean(axis=0) + 0.5) * _CELL - inner.plan
+    toward = (both.mean(axis=0) + 0.5) * config.cell - inner.plan
     length = np.linalg.norm(toward, axis=-1, keepdims=True)
     facing = np.sum(toward * inner.normals, axis=-1) / np.maximum(length[:, 0], 1e-9)
     # A floor faces neither way, and counts neither way.
@@ -148,24 +140,24 @@ def _inward(inner: Standing, outer: Standing) -> float:
     return float(facing.sum() / max(steepness, 1e-9))
 
 
-def _walls(far: Standing, near: Standing) -> bool:
+def _walls(far: Standing, near: Standing, config: FootprintsConfig) -> bool:
     """Whether two are the far wall of a round thing, seen from within, and its near wall, seen from
     without: of one height, one facing the middle and one away, and round together."""
     return (
-        abs(far.high - near.high) < _ABOVE
-        and _inward(far, near) > _FACING
-        and _inward(near, far) < -_FACING
-        and _gap(far, near) < _ROUND
+        abs(far.high - near.high) < config.above
+        and _inward(far, near, config) > config.facing
+        and _inward(near, far, config) < -config.facing
+        and _gap(far, near) < config.round
     )
 
 
-def _hangs(first: Standing, second: Standing) -> bool:
+def _hangs(first: Standing, second: Standing, config: FootprintsConfig) -> bool:
     """Whether the upper of two that touch neither stands on the table nor lies on the lower."""
     lower, upper = (first, second) if first.low < second.low else (second, first)
-    middle = tuple(int(c) for c in np.floor(upper.middle / _CELL))
-    return upper.low > _STANDS and middle not in lower.cells
+    middle = tuple(int(c) for c in np.floor(upper.middle / config.cell))
+    return upper.low > config.stands and middle not in lower.cells
 
 
-def _at_one_height(first: Standing, second: Standing) -> bool:
+def _at_one_height(first: Standing, second: Standing, config: FootprintsConfig) -> bool:
     shared = min(first.high, second.high) - max(first.low, second.low)
-    return shared > _SAME_RANGE * min(first.high - first.low, second.high - second.low)
+    return shared > config.same_range * min(first.high - first.low, second.high - second.low)

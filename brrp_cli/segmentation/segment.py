@@ -7,11 +7,10 @@ other (a mug's walls), or that are of one vivid colour on one spot, are joined a
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
+from brrp_cli.config.segmentation import SegmentConfig
 from brrp_cli.dependencies import import_library
 from brrp_cli.errors import FrameError
 from brrp_cli.frames.frame import BACKGROUND, Frame
@@ -25,30 +24,6 @@ from brrp_cli.segmentation.smooth_depth import flying_pixels, smooth_depth
 from brrp_cli.segmentation.table_plane import find_table
 
 
-@dataclass(frozen=True)
-class SegmentConfig:
-    """Lengths are metres.
-
-    min_height, max_height : what rises less above the table is the table. Between the two it is
-        `sigmas` deviations of the table's own height, which grow with the square of the distance
-    rim : pixels that rise that part of it join an object within `reach`
-    border : parts are joined where their common border is less of a boundary than that (0 to 1)
-    overlap : parts whose footprints share that part of the smaller one may be one object
-    margin : how far beside the seen table an object may stand
-    min_area : objects that show less of themselves are dropped, metres squared
-    """
-
-    min_height: float = 0.004
-    max_height: float = 0.015
-    sigmas: float = 3.5
-    rim: float = 0.7
-    reach: float = 0.008
-    border: float = 0.45
-    overlap: float = 0.3
-    margin: float = 0.03
-    min_area: float = 0.0007
-
-
 def segment(frame: Frame, seed: int = 0, config: SegmentConfig | None = None) -> NDArray[np.int64]:
     """Masks (H, W) of the objects that stand on the table: 1, 2, ... from left to right.
 
@@ -60,10 +35,11 @@ def segment(frame: Frame, seed: int = 0, config: SegmentConfig | None = None) ->
     ndimage = import_library("scipy.ndimage")
     config = config or SegmentConfig()
     raw = np.where(frame.valid, frame.points[..., 2], np.nan)
-    depth = smooth_depth(np.where(flying_pixels(raw), np.nan, raw))
+    smoothing = config.smooth_depth
+    depth = smooth_depth(np.where(flying_pixels(raw, smoothing), np.nan, raw), smoothing)
     points = backproject(depth, frame.K).astype(np.float64)
     valid = np.isfinite(depth)
-    table = find_table(points[valid], seed, frame.source)
+    table = find_table(points[valid], seed, frame.source, config.table)
     height = table.plane.signed_distance(points)
     plan = table.plan(points)
     lift = _lift(height, depth, config)
@@ -73,24 +49,22 @@ def segment(frame: Frame, seed: int = 0, config: SegmentConfig | None = None) ->
         risen = on_table & (height > lift)
         rim = on_table & (height > config.rim * lift)
         floor = on_table & (height > -config.max_height)
-    normals = surface_normals(points)
-    crease = hollow_creases(points, normals)
-    jumps = depth_jumps(depth, frame.K)
+    normals = surface_normals(points, config.concave_edges)
+    crease = hollow_creases(points, normals, config.concave_edges)
+    jumps = depth_jumps(depth, frame.K, config.concave_edges)
     boundary = np.maximum(crease, jumps)
     # Across a jump nothing meets, however the surfaces on both sides lie.
     meets = np.where(ndimage.binary_dilation(jumps, iterations=2), 0.0, crease)
-    parts = find_parts(risen, boundary)
-    parts = join_parts(parts, boundary, config.border)
-    parts = join_on_one_spot(
-        parts, plan, height, table.plan(normals), meets, frame.rgb, config.overlap
-    )
+    parts = find_parts(risen, boundary, config.components)
+    parts = join_parts(parts, boundary, config.border, config.components)
+    parts = join_on_one_spot(parts, plan, height, table.plan(normals), meets, frame.rgb, config)
     small = _areas(parts, frame) < config.min_area
     segmap = absorb_small(parts, boundary, small)
     # Pixels at edges, which were left out of the smoothed depth, join what they lie next to.
     edges = frame.valid & ~valid & (table.plane.signed_distance(frame.points) > config.rim * lift)
     points = np.where(edges[..., None], frame.points, points)
     segmap = grow(segmap, points, rim | edges, config.reach)
-    segmap = fill_inside(segmap, table.plan(points), floor)
+    segmap = fill_inside(segmap, table.plan(points), floor, config.concavities)
     segmap = fill_holes(segmap, ~frame.valid)
     return _numbered(segmap, frame, config.min_area)
 

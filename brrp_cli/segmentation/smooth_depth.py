@@ -13,55 +13,50 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
+from brrp_cli.config.segmentation import SmoothDepthConfig
+
 Array = NDArray[np.float64]
 
-# Inverse metres: 3 mm at 1 m, the step and the deviation of the first Kinect and of stereo
-# cameras at that range; and metres, which no camera's depth is better than, however near.
-NOISE = 0.003
-FLOOR = 0.0015
-_RADIUS = 3
-_ROUNDS = 2
 
-
-def smooth_depth(depth: NDArray[np.floating]) -> Array:
+def smooth_depth(depth: NDArray[np.floating], config: SmoothDepthConfig) -> Array:
     """Depth (H, W), metres, averaged over what is one surface; NaN, no return, stays NaN."""
     inverse = 1.0 / np.asarray(depth, dtype=np.float64)
-    noise = _noise(inverse)
-    for _ in range(_ROUNDS):
-        inverse = _averaged(inverse, noise)
+    noise = _noise(inverse, config)
+    for _ in range(config.rounds):
+        inverse = _averaged(inverse, noise, config.radius)
     return 1.0 / inverse
 
 
-def flying_pixels(depth: NDArray[np.floating]) -> NDArray[np.bool_]:
+def flying_pixels(depth: NDArray[np.floating], config: SmoothDepthConfig) -> NDArray[np.bool_]:
     """(H, W) bool: pixels that float between surfaces, as a camera makes them at depth edges.
 
-    Such a pixel has few neighbours at its depth: less than three eighths of those within two
-    pixels that have depth, or hardly any.
+    Such a pixel has few neighbours at its depth: less than a part of those within two pixels
+    that have depth, or hardly any.
     depth : (H, W) metres, NaN = no return
     """
     inverse = 1.0 / np.asarray(depth, dtype=np.float64)
-    noise = _noise(inverse)
+    noise = _noise(inverse, config)
     near = np.zeros(depth.shape)
     valid = np.zeros(depth.shape)
     padded = np.pad(inverse, 2, constant_values=np.nan)
     for shifted in _shifted(padded, 2, depth.shape):
         with np.errstate(invalid="ignore"):
-            near += np.abs(shifted - inverse) < 5 * noise
+            near += np.abs(shifted - inverse) < config.flying_noise * noise
         valid += np.isfinite(shifted)
-    few = (near - 1 < 0.375 * (valid - 1)) | (near < 6)
+    few = (near - 1 < config.flying_share * (valid - 1)) | (near < config.flying_least)
     return np.asarray(few & np.isfinite(inverse))
 
 
-def _noise(inverse: Array) -> Array:
+def _noise(inverse: Array, config: SmoothDepthConfig) -> Array:
     """Deviation of inverse depth (H, W), 1 / metres."""
-    return np.maximum(NOISE, FLOOR * inverse**2)
+    return np.maximum(config.noise, config.floor * inverse**2)
 
 
-def _averaged(inverse: Array, noise: Array) -> Array:
+def _averaged(inverse: Array, noise: Array, radius: int) -> Array:
     total = np.zeros(inverse.shape)
     weights = np.zeros(inverse.shape)
-    padded = np.pad(inverse, _RADIUS, constant_values=np.nan)
-    for shifted in _shifted(padded, _RADIUS, inverse.shape):
+    padded = np.pad(inverse, radius, constant_values=np.nan)
+    for shifted in _shifted(padded, radius, inverse.shape):
         with np.errstate(invalid="ignore"):
             weight = np.exp(-0.5 * ((shifted - inverse) / (2 * noise)) ** 2)
         weight[~np.isfinite(weight)] = 0.0

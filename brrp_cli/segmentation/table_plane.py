@@ -7,17 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from brrp_cli.config.segmentation import TableConfig
 from brrp_cli.dependencies import import_library
 from brrp_cli.errors import FrameError
 from brrp_cli.observation.support_plane import Plane, largest_plane
 from brrp_cli.seeds import child_rng, child_seed
-
-_DRAWN = 40_000
-_TOLERANCE = 0.01
-_CANDIDATES = 3
-_PARALLEL = np.cos(np.radians(10))
-_TABLE_HEIGHT = 0.2
-_CELL = 0.02
 
 
 @dataclass(frozen=True)
@@ -58,71 +52,85 @@ def convex_hull(plan: NDArray[np.float64]) -> NDArray[np.float64] | None:
         return None
 
 
-def find_table(points: NDArray[np.floating], seed: int, source: object = None) -> Table:
+def find_table(
+    points: NDArray[np.floating], seed: int, source: object, config: TableConfig
+) -> Table:
     """The support plane of points (n, 3), metres, camera frame.
 
     The planes with most points are found one after the other (RANSAC). The table is the largest,
     or, where a floor is larger, a plane that lies well above it, is parallel to it and has a
-    quarter of its points.
+    good part of its points.
 
-    Errors: FrameError if no plane holds a twentieth of the points.
+    source : for messages. Errors: FrameError if no plane holds `config.least` of the points.
     """
-    if len(points) > _DRAWN:
-        points = points[child_rng(seed, "table").choice(len(points), _DRAWN, replace=False)]
-    planes = _largest_planes(points.astype(np.float64), seed)
+    if len(points) > config.points:
+        drawn = child_rng(seed, "table").choice(len(points), config.points, replace=False)
+        points = points[drawn]
+    planes = _largest_planes(points.astype(np.float64), seed, config)
     if not planes:
         raise FrameError(
             "No support plane was found",
             where=source,
             expected="a table that fills a good part of the image",
-            found="no plane with a twentieth of the points",
+            found=f"no plane with {config.least:.0%} of the points",
             fix="take the picture so that more of the table is seen, or pass masks with --masks",
         )
-    plane = _above_the_floor(planes)
+    plane = _above_the_floor(planes, config)
     axes = np.linalg.svd(plane.normal[None])[2][1:]
-    on = (points @ axes.T)[np.abs(plane.signed_distance(points)) < _TOLERANCE]
-    hull = convex_hull(_largest_patch(on))
+    on = (points @ axes.T)[np.abs(plane.signed_distance(points)) < config.tolerance]
+    hull = convex_hull(_largest_patch(on, config.cell))
     if hull is None:
         raise FrameError("The support plane has no extent", where=source)
     return Table(plane=plane, axes=axes, hull=hull)
 
 
-def _largest_planes(points: NDArray[np.float64], seed: int) -> list[tuple[Plane, int]]:
-    """Planes with at least a twentieth of the points, most points first, camera side positive."""
+def _largest_planes(
+    points: NDArray[np.float64], seed: int, config: TableConfig
+) -> list[tuple[Plane, int]]:
+    """Planes with `config.least` of the points, most points first, camera side positive."""
     planes: list[tuple[Plane, int]] = []
     rest = points
-    for index in range(_CANDIDATES):
-        if len(rest) < len(points) / 20:
+    least = config.least * len(points)
+    for index in range(config.candidates):
+        if len(rest) < least:
             break
-        model = largest_plane(rest, _TOLERANCE, 1000, child_seed(seed, "table", index))
+        model = largest_plane(
+            rest,
+            child_seed(seed, "table", index),
+            tolerance=config.tolerance,
+            iterations=config.iterations,
+            drawn_points=config.ransac_points,
+            min_points=config.min_points,
+        )
         if model is None:
             break
         model = model if model[3] > 0 else -model
         plane = Plane(model[:3], float(model[3]))
-        inlier = np.abs(plane.signed_distance(rest)) < _TOLERANCE
-        if inlier.sum() < len(points) / 20:
+        inlier = np.abs(plane.signed_distance(rest)) < config.tolerance
+        if inlier.sum() < least:
             break
         planes.append((plane, int(inlier.sum())))
         rest = rest[~inlier]
     return sorted(planes, key=lambda pair: -pair[1])
 
 
-def _above_the_floor(planes: list[tuple[Plane, int]]) -> Plane:
+def _above_the_floor(planes: list[tuple[Plane, int]], config: TableConfig) -> Plane:
     largest, size = planes[0]
     table = largest
     for plane, count in planes[1:]:
-        parallel = plane.normal @ largest.normal > _PARALLEL
+        parallel = plane.normal @ largest.normal > np.cos(np.radians(config.parallel))
         # Offsets are the camera's heights above the planes. What rises less than a table's legs
         # are long is the tops of things on the table.
-        if parallel and count >= size / 4 and table.offset - plane.offset > _TABLE_HEIGHT:
+        higher = table.offset - plane.offset > config.height
+        if parallel and count >= config.of_floor * size and higher:
             table = plane
     return table
 
 
-def _largest_patch(plan: NDArray[np.float64]) -> NDArray[np.float64]:
+def _largest_patch(plan: NDArray[np.float64], cell: float) -> NDArray[np.float64]:
     """Those of the plan points (n, 2) that hang together: a floor beyond the edge is no table."""
     ndimage = import_library("scipy.ndimage")
-    cells = np.floor(plan / _CELL).astype(np.int64)
+    cells = np.floor(plan / cell).astype(np.int64)
     cells -= cells.min(axis=0)
     grid = np.zeros(cells.max(axis=0) + 1, dtype=bool)
     grid[tuple(cells.T)] = True

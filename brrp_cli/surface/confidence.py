@@ -1,7 +1,7 @@
 """The surface inside which an object lies with a given probability.
 
 A posterior tells for each point how probably it is occupied. Of the whole shape O it says this:
-particle i is drawn with probability 1 / P, a level u uniformly from (0, 1), and
+particle i is drawn with the probability of its share, a level u uniformly from (0, 1), and
 
     O = {x : p_i(x) > u}.
 
@@ -27,11 +27,14 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.stats import chi2, norm
 
 from brrp_cli.config import SurfaceConfig
-from brrp_cli.inference.particles import particle_volumes
+from brrp_cli.inference.hypothesis_posterior import HypothesisPosterior
+from brrp_cli.inference.particles import particle_shares, particle_volumes
 from brrp_cli.reconstruction import Axes, OccupancyPosterior
 from brrp_cli.surface.extract import grid_axes, level_set
+from brrp_cli.surface.stored_mesh import along_normals, moved_to_level, placed
 
 # Which of points (n, 3), metres, camera frame, were seen to be empty: (n,) bool.
 Empty = Callable[[NDArray[np.float64]], NDArray[np.bool_]]
@@ -42,7 +45,8 @@ class ConfidenceSurface:
     """A closed, outward mesh that the object lies inside of with probability `confidence`.
 
     vertices : (n, 3) float64, metres, camera frame; faces : (m, 3) int64
-    level : t, the occupancy probability on it
+    level : t, the occupancy probability on it; around a recognised object's mesh, whose place and
+    not whose shape is in doubt, 1 - confidence
     bounded : false where the region reaches the end of what the posterior describes, so that
     the object may go on beyond it
     """
@@ -54,17 +58,21 @@ class ConfidenceSurface:
     bounded: bool
 
 
-def confidence_level(volumes: NDArray[np.floating], confidence: float) -> float | None:
+def confidence_level(
+    volumes: NDArray[np.floating], confidence: float, shares: NDArray[np.float64] | None = None
+) -> float | None:
     """The largest t at which P(O in C_t) >= confidence; None where even "O is empty" is that
     probable.
 
-    volumes : (P, ...) occupancy of each particle at the points of a grid; confidence : in (0, 1)
+    volumes : (P, ...) occupancy of each particle at the points of a grid; confidence : in (0, 1);
+    shares : (P,), sum 1, the weight of each particle; None: all weigh the same
     """
     particles = volumes.reshape(len(volumes), -1)
-    mean = particles.mean(axis=0)
+    shares = np.full(len(volumes), 1 / len(volumes)) if shares is None else shares
+    mean = shares @ particles
     order = np.argsort(mean, kind="stable")
     # P(O not in C) when the first k points are outside of C.
-    missed = np.maximum.accumulate(particles[:, order], axis=1).mean(axis=0)
+    missed = shares @ np.maximum.accumulate(particles[:, order], axis=1)
     left_out = int(np.searchsorted(missed, 1 - confidence, side="right"))
     return None if left_out == len(mean) else float(mean[order[left_out]])
 
@@ -83,14 +91,21 @@ def confidence_surface(
     observed point is near are dropped. None where nothing is left.
     margin : metres by which C_t is grown where `empty` does not forbid it
     """
+    if isinstance(posterior, HypothesisPosterior) and posterior.dominant is not None:
+        around = _around_stored_mesh(
+            posterior, posterior.dominant, confidence, config, margin, empty
+        )
+        if around is not None:
+            return around
     axes = grid_axes(posterior.bounds, config.spacing)
     volumes = particle_volumes(posterior, axes)
-    level = confidence_level(volumes, confidence)
+    shares = particle_shares(posterior, len(volumes))
+    level = confidence_level(volumes, confidence, shares)
     if level is None:
         return None
     # The mesh is the best guess, at whatever level: it lies inside in any case.
     level = min(level, config.level)
-    mean = volumes.mean(axis=0)
+    mean = np.tensordot(shares, volumes, axes=1)
     found = level_set(mean, axes, observed, level, config)
     if found is not None and margin > 0:
         # In units of the level, so that the surface of C_t stays where it may not grow.
@@ -101,6 +116,42 @@ def confidence_surface(
     return ConfidenceSurface(
         found.vertices, found.faces, confidence, level, bounded=not _at_edge(mean >= level)
     )
+
+
+def _around_stored_mesh(
+    posterior: HypothesisPosterior,
+    number: int,
+    confidence: float,
+    config: SurfaceConfig,
+    margin: float,
+    empty: Empty | None,
+) -> ConfidenceSurface | None:
+    """The same along the normals of a recognised object's mesh, which no grid makes coarser; None
+    where the frame contradicts the stored shape."""
+    through = along_normals(posterior, number, config)
+    best = moved_to_level(through, config.level)
+    if best.off > config.most_off:
+        return None
+    shape = placed(posterior, number)
+    # All placements that are as probable, at once (Scheffe's band): the pose has six unknowns.
+    by_pose = np.sqrt(chi2.ppf(confidence, 6)) * shape.deviations
+    band = np.hypot(by_pose, norm.ppf((1 + confidence) / 2) * config.fidelity)
+    # Where a vertex is a corner, its faces move by less than itself.
+    vertices = best.vertices + (band * shape.shape.corners)[:, None] * through.normals
+    if posterior.object_weight(number) < confidence:
+        # The object may be something else altogether.
+        level = confidence_level(through.particles, confidence, posterior.shares)
+        if level is None:
+            return None
+        other = moved_to_level(through, min(level, config.level)).vertices
+        outer = np.einsum("ni,ni->n", other - vertices, through.normals) > 0
+        vertices = np.where(outer[:, None], other, vertices)
+    if margin > 0:
+        grown = vertices + margin * through.normals
+        may_grow = np.ones(len(grown), dtype=bool) if empty is None else ~empty(grown)
+        vertices = np.where(may_grow[:, None], grown, vertices)
+    faces = shape.shape.faces.astype(np.int64)
+    return ConfidenceSurface(vertices, faces, confidence, 1 - confidence, bounded=True)
 
 
 def _at_edge(region: NDArray[np.bool_]) -> bool:

@@ -13,7 +13,7 @@ from brrp_cli.finite import check_finite
 from brrp_cli.inference.hypothesis_posterior import HypothesisPosterior
 from brrp_cli.reconstruction import Axes, OccupancyPosterior, Surface
 from brrp_cli.surface.connect import one_piece
-from brrp_cli.surface.stored_mesh import moved_mesh
+from brrp_cli.surface.stored_mesh import along_normals, moved_to_level, placed
 
 # How far, at least, the occupancy of what is inside lies above the level: 10 micrometres.
 _CLEAR = 1e-3
@@ -40,11 +40,17 @@ def extract_surface(
     if the posterior is not finite, or wider than any object.
     """
     if isinstance(posterior, HypothesisPosterior) and posterior.dominant is not None:
-        moved = moved_mesh(posterior, posterior.dominant, config)
+        through = along_normals(posterior, posterior.dominant, config)
+        moved = moved_to_level(through, config.level)
         check_finite("The surface", vertices=moved.vertices, uncertainty=moved.deviation)
         if moved.off <= config.most_off:
+            shape = placed(posterior, posterior.dominant).shape
             return Surface(
-                moved.vertices, moved.faces, moved.deviation, posterior.surface_unit, moved.colours
+                moved.vertices,
+                shape.faces.astype(np.int64),
+                moved.deviation,
+                posterior.surface_unit,
+                shape.colours,
             )
     spacing = grid_spacing(posterior.bounds, config)
     axes = grid_axes(posterior.bounds, spacing)

@@ -1,5 +1,5 @@
-"""The mesh of a recognised object: the stored one, moved along its normals to the posterior's level
-set.
+"""The mesh of a recognised object: the stored one, moved along its normals to a level set of the
+posterior.
 
 Its topology, its sharp edges and its thin walls survive, which a grid would lose.
 """
@@ -15,44 +15,94 @@ from brrp_cli.config import SurfaceConfig
 from brrp_cli.dependencies import import_open3d
 from brrp_cli.inference.hypothesis_posterior import HypothesisPosterior, MeanFunction, deviation
 from brrp_cli.inference.placed_shape import PlacedShape
+from brrp_cli.inference.posterior import occupancy
 
 Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class MovedMesh:
-    """vertices : (n, 3) metres, camera frame; faces : (m, 3); colours : (n, 3) uint8; deviation :
-    (n,) metres, standard deviation of the surface's place
-    off : share of the vertices that the level set is further away from than the mesh may be moved
+class AlongNormals:
+    """Occupancy on the way through the surface of a placed shape, along its vertices' normals.
+
+    vertices, normals : (n, 3), metres, camera frame; way : (steps, n) metres along the normals,
+    ascending; particles : (P, steps, n) occupancy of each particle; mean : (steps, n)
     """
 
     vertices: Array
-    faces: NDArray[np.int64]
-    colours: NDArray[np.uint8]
+    normals: Array
+    way: Array
+    particles: NDArray[np.float32]
+    mean: NDArray[np.float32]
+
+
+@dataclass(frozen=True)
+class Moved:
+    """vertices : (n, 3) metres, camera frame; deviation : (n,) metres, standard deviation of the
+    surface's place; off : share of the vertices that the level set is out of reach of
+    """
+
+    vertices: Array
     deviation: NDArray[np.float32]
     off: float
 
 
-def moved_mesh(posterior: HypothesisPosterior, number: int, config: SurfaceConfig) -> MovedMesh:
-    """The mesh of hypothesis `number`, a placed shape, at the level set of the whole posterior.
+def along_normals(
+    posterior: HypothesisPosterior, number: int, config: SurfaceConfig
+) -> AlongNormals:
+    """The way through the surface of hypothesis `number`, a placed shape: `config.farthest` metres
+    outwards, and inwards no more than `config.wall_share` of the wall.
 
-    Along each vertex's normal the occupancy is known without a look at the mesh: the shape's own
-    logit falls by 1 / width a metre, and the correction, whose kernels are centimetres wide, stays
-    what it is. Other hypotheses are evaluated at the ends and in the middle of the way.
+    The occupancy there is known without a look at the mesh: the shape's own logit falls by 1 /
+    width a metre, and the correction, whose kernels are centimetres wide, stays what it is. Other
+    hypotheses are evaluated at the ends and in the middle.
     """
+    shape = placed(posterior, number)
+    vertices, normals = shape.vertices, shape.normals
+    inwards = np.minimum(config.farthest, config.wall_share * wall_thickness(shape))
+    steps = np.linspace(-1, 1, config.steps)[:, None]
+    way = np.where(steps < 0, steps * inwards, steps * config.farthest)
+    correction = posterior.correction.logits(vertices)
+    logits = np.repeat(correction[:, None], len(way), axis=1)
+    for each, mean in enumerate(posterior.means):
+        if mean is shape:
+            line: NDArray[np.floating] = np.clip(-way / shape.width, -shape.limit, shape.limit)
+        else:
+            ends = [_coarse_logits(mean, vertices + way[[i]].T * normals) for i in (0, -1)]
+            middle = _coarse_logits(mean, vertices)
+            line = middle + np.where(
+                steps < 0, -steps * (ends[0] - middle), steps * (ends[1] - middle)
+            )
+        logits[posterior.which == each] += line.astype(np.float32)
+    particles = occupancy(logits)
+    mean_occupancy = np.tensordot(posterior.shares, particles, axes=1).astype(np.float32)
+    return AlongNormals(vertices, normals, way, particles, mean_occupancy)
+
+
+def placed(posterior: HypothesisPosterior, number: int) -> PlacedShape:
+    """Hypothesis `number`, which has to be a placed shape."""
     shape = posterior.means[number]
     assert isinstance(shape, PlacedShape)
-    vertices, normals = shape.vertices, shape.normals
-    farthest = np.minimum(config.farthest, config.wall_share * wall_thickness(shape))
-    steps = np.linspace(-1, 1, config.steps)
-    logits = _along_normals(posterior, number, vertices, normals, farthest, steps)
-    # Near the surface the posterior is not zero or one, and probabilities are averaged as such.
-    occupancy = posterior.mean_occupancy(logits)  # (steps, n)
-    offset, steepness, crossed = _crossing(occupancy, steps, farthest, config.level)
-    return MovedMesh(
-        vertices + offset[:, None] * normals,
-        shape.shape.faces.astype(np.int64),
-        shape.shape.colours,
+    return shape
+
+
+def moved_to_level(through: AlongNormals, level: float) -> Moved:
+    """Each vertex where occupancy falls through `level`, next to where it was; at the end of the
+    way that comes nearest to it where it does not."""
+    above = through.mean - level
+    falls = (above[:-1] >= 0) & (above[1:] < 0)
+    middle = np.abs(through.way[:-1] + through.way[1:])
+    row = np.argmin(np.where(falls, middle, np.inf), axis=0)
+    column = np.arange(above.shape[1])
+    before, after = above[row, column], above[row + 1, column]
+    start, end = through.way[row, column], through.way[row + 1, column]
+    gap = np.maximum(before - after, 1e-6)
+    crossed = np.any(falls, axis=0)
+    outside = above[len(above) // 2] < 0
+    ends = np.where(outside, through.way[0], through.way[-1])
+    offset = np.where(crossed, start + (end - start) * before / gap, ends)
+    steepness = np.where(crossed, gap / np.maximum(end - start, 1e-9), 0.0)
+    return Moved(
+        through.vertices + offset[:, None] * through.normals,
         deviation(steepness),
         float(1 - crossed.mean()),
     )
@@ -70,59 +120,9 @@ def wall_thickness(shape: PlacedShape) -> Array:
     return np.asarray((np.where(np.isfinite(hit), hit, np.inf) + start) * shape.unit)
 
 
-def _along_normals(
-    posterior: HypothesisPosterior,
-    number: int,
-    vertices: Array,
-    normals: Array,
-    farthest: Array,
-    steps: Array,
-) -> NDArray[np.float32]:
-    """Logits (P, steps, n) of each particle on the way from -farthest to farthest along the
-    normals."""
-    correction = posterior.correction.logits(vertices)
-    found = np.repeat(correction[:, None], len(steps), axis=1)
-    for each, mean in enumerate(posterior.means):
-        if each == number and isinstance(mean, PlacedShape):
-            way = steps[:, None] * farthest
-            line = np.clip(-way / mean.width, -mean.limit, mean.limit)
-        else:
-            ends = [
-                _far_logits(mean, vertices + s * farthest[:, None] * normals) for s in (-1, 0, 1)
-            ]
-            line = np.where(
-                steps[:, None] < 0,
-                ends[1] + steps[:, None] * (ends[1] - ends[0]),
-                ends[1] + steps[:, None] * (ends[2] - ends[1]),
-            )
-        found[posterior.which == each] += line.astype(np.float32)
-    return found
-
-
-def _far_logits(mean: MeanFunction, points: Array) -> NDArray[np.float32]:
+def _coarse_logits(mean: MeanFunction, points: Array) -> NDArray[np.float32]:
     """Logits from a shape's coarse field, which is all that the average over hypotheses needs."""
     if isinstance(mean, PlacedShape):
         distance = mean.signed_distance(points, 0.0)
         return np.clip(-distance / mean.width, -mean.limit, mean.limit).astype(np.float32)
     return mean.logits(points)
-
-
-def _crossing(
-    occupancy: NDArray[np.float32], steps: Array, farthest: Array, level: float
-) -> tuple[Array, Array, NDArray[np.bool_]]:
-    """Where occupancy (steps, n) falls through `level`, nearest to the middle: offset (n,) metres,
-    how steeply (n,) per metre, and whether it does; where it does not, the end where it comes
-    nearest."""
-    above = occupancy - level
-    falls = (above[:-1] >= 0) & (above[1:] < 0)
-    middle = np.abs(steps[:-1] + steps[1:])[:, None]
-    first = np.argmin(np.where(falls, middle, np.inf), axis=0)
-    column = np.arange(occupancy.shape[1])
-    before, after = above[first, column], above[first + 1, column]
-    gap = np.maximum(before - after, 1e-6)
-    width = steps[1] - steps[0]
-    at = steps[first] + width * before / gap
-    crossed: NDArray[np.bool_] = np.any(falls, axis=0)
-    at = np.where(crossed, at, np.where(above[len(steps) // 2] >= 0, 1.0, -1.0))
-    steepness = np.where(crossed, gap / (width * farthest), 0.0)
-    return np.asarray(at * farthest), np.asarray(steepness), crossed

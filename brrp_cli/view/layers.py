@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brrp_cli.frames.frame import BACKGROUND, Frame
-from brrp_cli.geometry import project, transform_points
+from brrp_cli.geometry import transform_points
 from brrp_cli.reconstruction import Surface
 from brrp_cli.results.read import StoredResult
 from brrp_cli.surface.colours import spread
@@ -17,30 +17,10 @@ from brrp_cli.surface.colours import spread
 if TYPE_CHECKING:
     import trimesh
 
-# A vertex has the colour of its pixel if the depth there is this close to its own, metres.
-SEEN_WITHIN = 0.012
 # Of what is no object, points further than this from the objects' box are left out, metres.
 SURROUNDINGS = 0.25
 MOST_POINTS = 120_000
 PLAN_SCENE = "scene.glb"
-
-
-def seen_colours(vertices: NDArray[np.floating], frame: Frame, object_id: int) -> NDArray[np.uint8]:
-    """Colours (n, 3) of vertices (n, 3), metres, camera frame: of the pixel that saw the vertex,
-    else the object's median colour."""
-    mask = frame.segmap == object_id
-    typical = np.median(frame.rgb[mask], axis=0) if mask.any() else np.full(3, 128)
-    colours = np.tile(np.asarray(typical, dtype=np.uint8), (len(vertices), 1))
-    in_front = np.flatnonzero(vertices[:, 2] > 0)
-    height, width = frame.shape
-    u, v = np.rint(project(vertices[in_front], frame.K)).astype(np.int64).T
-    inside = (u >= 0) & (u < width) & (v >= 0) & (v < height)
-    index, u, v = in_front[inside], u[inside], v[inside]
-    depth = frame.points[v, u, 2]
-    with np.errstate(invalid="ignore"):
-        seen = mask[v, u] & (np.abs(depth - vertices[index, 2]) < SEEN_WITHIN)
-    colours[index[seen]] = frame.rgb[v[seen], u[seen]]
-    return colours
 
 
 def observed_points(
@@ -69,17 +49,13 @@ def point_stride(frame: Frame) -> int:
 
 
 def page_glb(stored: StoredResult) -> bytes:
-    """One GLB: `object_ID` with the colours that were seen and `_spread` on its vertices,
+    """One GLB: `object_ID` with its colours and `_spread` on its vertices,
     `points_ID`, and `plan_object_ID_part_I` where there are collision shapes."""
     import trimesh
 
     scene = trimesh.Scene()
-    T_cam_frame = np.linalg.inv(stored.T_frame_cam)
     for object_id, surface in stored.surfaces.items():
-        colours = seen_colours(
-            transform_points(T_cam_frame, surface.vertices), stored.frame, object_id
-        )
-        _add(scene, f"object_{object_id}", _as_mesh(surface, colours))
+        _add(scene, f"object_{object_id}", _as_mesh(surface))
     for object_id in [BACKGROUND, *stored.frame.object_ids]:
         points, colours = observed_points(stored, object_id)
         if len(points):
@@ -108,13 +84,13 @@ def collision_parts(stored: StoredResult, folder: str = "plan") -> dict[str, tri
     return parts
 
 
-def _as_mesh(surface: Surface, colours: NDArray[np.uint8]) -> trimesh.Trimesh:
+def _as_mesh(surface: Surface) -> trimesh.Trimesh:
     import trimesh
 
     return trimesh.Trimesh(
         surface.vertices,
         surface.faces,
-        vertex_colors=colours,
+        vertex_colors=surface.colours,
         vertex_attributes={"_spread": spread(surface).astype(np.float32)},
         process=False,
     )

@@ -81,6 +81,20 @@ def test_a_folder_becomes_meshes_beside_it(images):
     assert "--overwrite" in refused.output
 
 
+def test_a_file_configures_masks_and_method_and_is_kept_with_the_result(images, tmp_path):
+    path = tmp_path / "mine.toml"
+    path.write_text("hinge_spacing = 0.06\n[segmentation]\nmin_area = 0.0009\n")
+    result = run(*files(images), "--config", path, "-o", tmp_path / "out")
+    assert result.exit_code == 0, result.output
+    record = json.loads((tmp_path / "out" / "result.json").read_text())
+    assert record["config"]["hinge_spacing"] == 0.06 and record["config"]["gamma"] == 1000.0
+    assert record["segmentation"]["min_area"] == 0.0009
+    assert record["segmentation"]["table"]["tolerance"] == 0.01
+    path.write_text("[segmentation]\nmin_area = 1.0\n")
+    result = run(*files(images), "--config", path, "-o", tmp_path / "none")
+    assert result.exit_code == 1 and "Nothing stands on the table" in result.output
+
+
 def test_masks_that_are_given_are_used_and_a_page_may_stay_closed(images, tmp_path, monkeypatch):
     monkeypatch.setattr("webbrowser.open", lambda address: pytest.fail("it was opened"))
     out = tmp_path / "out"

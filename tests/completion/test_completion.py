@@ -6,19 +6,22 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from brrp_cli.inference.prior_mean import PriorMeanGrid, completed_grid, empty_space, grid_over
 from table_scene import TABLE, box, in_camera, photograph, placed
 
+from brrp_cli.completion.completed_mean import completed_grid, empty_space
 from brrp_cli.completion.network import Network, fitted, from_bytes
 from brrp_cli.completion.point_features import COUNT, point_features
 from brrp_cli.completion.visible_part import visible_part
 from brrp_cli.config import CompletionConfig, MeanConfig
 from brrp_cli.frames.projection import at_pixels, depth_behind
 from brrp_cli.geometry import transform_points
+from brrp_cli.inference.mean_grid import MeanGrid, grid_over
 from brrp_cli.observation.support_plane import Plane
 from brrp_cli.shapes import solids
 
 CONFIG, MEAN = CompletionConfig(), MeanConfig()
+# What the network says, without a crust.
+BARE = replace(MEAN, shell=0.0, shell_nodes=0.0, shell_before=0.0)
 
 
 def photographed(mesh, T_cam_mesh):
@@ -35,15 +38,15 @@ def completed(frame, config=MEAN, margin=0.05):
     part = part_of(frame)
     extent = part.extent
     box = np.stack([extent.min(axis=0) - margin, extent.max(axis=0) + margin])
-    lower, spacing, nodes = grid_over(box, config)
+    lower, spacing, nodes = grid_over(box, config.nodes)
     empty = empty_space(nodes.reshape(-1, 3), frame, 5, TABLE, config).reshape(nodes.shape[:3])
     logits = completed_grid(nodes, empty, part, config)
-    return nodes, PriorMeanGrid(lower, spacing, logits[None], -config.limit), empty
+    return nodes, MeanGrid(lower, spacing, logits, -config.limit), empty
 
 
 def inside(frame, points):
     """What is occupied, more likely than not."""
-    return completed(frame)[1].logits(points)[0] > 0
+    return completed(frame)[1].logits(points) > 0
 
 
 def iou(frame, T_cam_mesh, contains, half, count=20_000):
@@ -92,13 +95,15 @@ def test_a_cup_that_is_looked_into_stays_hollow():
 def test_what_is_seen_has_some_thickness_whatever_the_network_says():
     frame = photographed(solids.beaker(0.04, 0.04, 0.06, 0.004), placed(0.0, 0.0, 0.0))
     nodes, crusted, empty = completed(frame)
-    _, bare, _ = completed(frame, replace(MEAN, shell=0.0))
+    _, bare, _ = completed(frame, BARE)
     with_crust, without = (
-        grid.values[0].astype(float).ravel()[~empty.ravel()] for grid in (crusted, bare)
+        grid.values.astype(float).ravel()[~empty.ravel()] for grid in (crusted, bare)
     )
     points = nodes.reshape(-1, 3)[~empty.ravel()]
     behind = -depth_behind(points, frame)
-    seen = (at_pixels(points, frame.segmap, frame) == 5) & (behind > -0.001) & (behind < MEAN.shell)
+    thickness = max(MEAN.shell, MEAN.shell_nodes * crusted.spacing)
+    own = at_pixels(points, frame.segmap, frame) == 5
+    seen = own & (behind > -MEAN.shell_before) & (behind < thickness)
     assert (without[seen] < 0).any()
     assert (with_crust[seen] >= MEAN.shell_logit).all()
     np.testing.assert_array_equal(with_crust[~seen], without[~seen])
@@ -107,11 +112,11 @@ def test_what_is_seen_has_some_thickness_whatever_the_network_says():
 @pytest.mark.parametrize("nodes", [20_000, 60_000])
 def test_the_lattice_is_the_networks_where_it_counts(nodes):
     frame = photographed(box(), placed(0.0, 0.0, 0.3))
-    config = replace(MEAN, nodes=nodes, shell=0.0)
+    config = replace(BARE, nodes=nodes)
     part = part_of(frame)
     extent = part.extent
     around = np.stack([extent.min(axis=0) - 0.01, extent.max(axis=0) + 0.01])
-    _, _, at = grid_over(around, config)
+    _, _, at = grid_over(around, config.nodes)
     # Along x the last node is asked first, along y it lies beyond the last that is.
     at = at[: (at.shape[0] - 1) // 2 * 2 + 1, : at.shape[1] // 2 * 2]
     exact = fitted().logits(point_features(at.reshape(-1, 3), part)).reshape(at.shape[:3])

@@ -28,7 +28,7 @@ def test_the_roof_is_the_greatest_height_over_each_cell():
 
 def test_the_facets_of_a_box_are_its_six_sides_outward():
     corners = np.array([[x, y, z] for x in (0, 1) for y in (0, 2) for z in (0, 3)], float)
-    facets = hull_facets(corners)
+    facets = hull_facets(corners, 0.0005)
     assert len(facets) == 6
     assert (corners @ facets[:, :3].T + facets[:, 3] < 1e-9).all()
     assert (np.array([0.5, 1, 1.5]) @ facets[:, :3].T + facets[:, 3] < 0).all()

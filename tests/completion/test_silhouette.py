@@ -33,7 +33,7 @@ def test_what_another_object_hides_may_go_on_and_the_edge_of_the_image_ends_it()
 
 def test_a_handle_is_thin_all_over_and_the_disc_thick_to_its_edge():
     segmap = disc_with_a_handle()
-    width = local_thickness(within_silhouette(segmap))
+    width = local_thickness(within_silhouette(segmap), 12)
     assert width[60, 95:125] == pytest.approx(5, abs=1)
     # 24 pixels from the middle, where the silhouette is 6 pixels away.
     assert width[60 - 24, 50] > 24
@@ -46,7 +46,7 @@ def test_normals_are_unit_and_look_at_the_camera(count):
     """On a plane of known slope where there are points enough to tell."""
     rng = np.random.default_rng(0)
     x, y = rng.uniform(-0.03, 0.03, (2, count))
-    normals = surface_normals(np.column_stack([x, y, 0.8 + 0.5 * x]))
+    normals = surface_normals(np.column_stack([x, y, 0.8 + 0.5 * x]), 12)
     np.testing.assert_allclose(np.linalg.norm(normals, axis=1), 1, atol=1e-9)
     if count == 400:
         expected = np.array([0.5, 0, -1]) / np.hypot(0.5, 1)

@@ -3,7 +3,7 @@ import math
 import numpy as np
 import pytest
 
-from brrp_cli.evaluation.bootstrap import calibration_interval, mean_interval
+from brrp_cli.evaluation.bootstrap import calibration_interval, mean_interval, median_interval
 
 
 def rng():
@@ -57,3 +57,21 @@ def test_calibration_error_of_a_set_is_that_of_its_pooled_points():
     assert calibration_interval([low, high], ["a", "b"], rng()).value == 0.0
     apart = calibration_interval([low], ["a"], rng())
     assert apart.value == pytest.approx(0.2) and math.isnan(apart.low)
+
+
+@pytest.mark.parametrize("count", [301, 300])
+def test_median_of_independent_values_is_that_of_the_normal_law(count):
+    values = np.random.default_rng(1).normal(3.0, 2.0, count)
+    found = median_interval([*values, math.nan], [str(i) for i in range(count + 1)], rng())
+    assert found.value == pytest.approx(np.median(values)) and found.count == count
+    half = 1.96 * 2.0 * math.sqrt(math.pi / 2 / count)
+    assert found.high - found.low == pytest.approx(2 * half, rel=0.3)
+
+
+def test_medians_of_few_scenes():
+    found = median_interval([1.0, 1.0, 1.0, 5.0], ["a", "a", "a", "b"], rng())
+    # Draws of two scenes: aa, ab or ba, bb.
+    assert (found.value, found.low, found.high) == (1.0, 1.0, 5.0)
+    assert median_interval([1.0, 4.0], ["a", "a"], rng()).value == 2.5
+    none = median_interval([math.nan], ["a"], rng())
+    assert math.isnan(none.value) and none.count == 0

@@ -83,6 +83,11 @@ def test_shapes_are_measured(first):
         assert float(row["iou"]) > 0.4 and float(row["iou_5mm"]) > 0.4
         assert 0 < float(row["chamfer"]) < 0.06
         assert float(row["f_score_1cm"]) > 0.4
+        # The written mesh: every one of these is a ball, a can or a box, in one closed piece.
+        assert 0 < float(row["surface_distance"]) < 0.02 and float(row["f_score_10mm"]) > 0.4
+        assert 0.4 < float(row["volume_ratio"]) < 2.5 and row["thickness_class"] == "solid"
+        assert row["watertight"] == row["one_piece"] == row["pieces"] == "1.0"
+        assert float(row["surface_distance_seen"]) < 0.01
         for region in ("near", "occluded"):
             assert 0 < float(row[f"brier_{region}"]) < 0.25
             assert 0 < float(row[f"nll_{region}"]) < math.log(2)
@@ -95,6 +100,10 @@ def test_shapes_are_measured(first):
                 "0.7",
             )
             assert row["best"] == row["name"] and float(row["placement_error"]) < 0.02
+            if row["preset"] == "default":
+                assert (row["recognised"], row["taken_for"]) == ("True", row["name"])
+                assert float(row["weight_true"]) == float(row["weight_best"]) > 0.5
+                assert float(row["size_factor"]) == pytest.approx(1.0, abs=0.11)
         else:
             assert row["best"] == row["true_rank"] == row["placement_error"] == ""
 
@@ -104,12 +113,19 @@ def test_what_failed_is_a_row_and_is_counted(first):
     ghosts = [row for row in rows_of(folder) if int(row["object_id"]) == GHOST]
     assert [row["status"] for row in ghosts] == ["too_few_points"] * 3
     assert all(row["iou"] == row["chamfer"] == "" for row in ghosts)
+    # Without a mesh nothing of it is right, and there is no distance.
+    assert all(row["f_score_10mm"] == row["watertight"] == "0.0" for row in ghosts)
+    assert all(row["surface_distance"] == "" for row in ghosts)
     assert result.exit_code == 3, result.output
     assert "3 objects, 1 failed, 0 empty" in result.output
     summary = json.loads((folder / "summary.json").read_text())
     for found in summary["results"].values():
         assert (found["objects"], found["failed"]) == (3, 1)
         assert found["metrics"]["iou"]["count"] == 2
+        written = found["written"]["all"]
+        assert (written["objects"], written["without_mesh"]) == (3, 1)
+        assert written["metrics"]["f_score_10mm"]["count"] == 3
+        assert written["metrics"]["surface_distance_median"]["count"] == 2
 
 
 def test_the_summary_holds_means_of_the_rows(first):
@@ -131,7 +147,9 @@ def test_report_plots_and_pictures_are_written(first):
     folder, _ = first
     text = (folder / "report.md").read_text()
     assert "| BRRP | 0.3124 | 0.5277 | 1.01 | 1.05 | 1.7 |" in text
-    for name in ("chamfer", "timing", "reliability"):
+    headings = [line for line in text.splitlines() if line.startswith("## ")]
+    assert headings[0] == "## The written mesh against the exact mesh"
+    for name in ("distance", "chamfer", "timing", "reliability"):
         assert f"![{name}](plots/{name}.png)" in text
         with Image.open(folder / "plots" / f"{name}.png") as image:
             assert image.size[0] > 400

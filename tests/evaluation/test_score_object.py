@@ -13,7 +13,7 @@ from brrp_cli.evaluation.score_object import (
 )
 from brrp_cli.frames.frame import Frame
 from brrp_cli.geometry import similarity
-from brrp_cli.ground_truth.true_meshes import ClosedMeshes
+from brrp_cli.ground_truth.true_meshes import ClosedMeshes, ExactMesh
 from brrp_cli.ground_truth.true_shape import behind_seen, true_shape
 from brrp_cli.reconstruction import Retrieved
 
@@ -61,7 +61,8 @@ def frame():
 def truth(frame):
     ball = trimesh.creation.icosphere(4, RADIUS).apply_translation(CENTER)
     thick = trimesh.creation.icosphere(4, RADIUS + 0.005).apply_translation(CENTER)
-    meshes = ClosedMeshes(exact=ball, for_iou=thick, for_chamfer=thick).moved(T_WORLD_CAM)
+    exact = ExactMesh(ball, thickness=2 * RADIUS, pieces=1)
+    meshes = ClosedMeshes(exact, for_iou=thick, for_chamfer=thick).moved(T_WORLD_CAM)
     return true_shape(meshes, frame, np.random.default_rng(0))
 
 

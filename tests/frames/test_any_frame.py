@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import json
+import logging
 import resource
 import signal
 import time
@@ -339,6 +340,7 @@ def test_points_of_which_none_is_whole_are_refused() -> None:
 def test_depth_beyond_a_hundred_metres_is_no_return_and_is_told(
     caplog: pytest.LogCaptureFixture,
 ) -> None:
+    caplog.set_level(logging.INFO)
     depth = np.full(SIZE, 0.8)
     depth[0, :3] = [101.0, 1e30, 3e38]
     frame = make_frame(None, None, depth=depth, K=K)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import logging
+
 import numpy as np
 import pytest
 
@@ -161,6 +163,7 @@ def test_intrinsics_are_recovered_from_points():
 
 
 def test_a_principal_point_outside_the_image_is_noted(caplog):
+    caplog.set_level(logging.INFO)
     make_frame(**good(K=matrix(a02=20)))
     assert "outside the 8 x 6 image" in caplog.text
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import logging
 
 import numpy as np
 import pytest
@@ -205,6 +206,7 @@ def test_wrong_intrinsics_are_told(tmp_path, text, message):
 
 
 def test_lens_distortion_is_noted(tmp_path, caplog):
+    caplog.set_level(logging.INFO)
     path = tmp_path / "k.json"
     path.write_text(json.dumps({**KINDS["RealSense"], "coeffs": [0.1, 0, 0, 0, 0]}))
     read_intrinsics(path)

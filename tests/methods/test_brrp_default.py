@@ -15,7 +15,7 @@ from brrp_cli.geometry import transform_points
 from brrp_cli.prior.build.build import build_prior
 from brrp_cli.prior.parameters import BuildParameters
 from brrp_cli.raycast import inside
-from brrp_cli.reconstruction import NO_SURFACE, OK
+from brrp_cli.reconstruction import METRES, NO_SURFACE, OK
 from brrp_cli.retrieval.given import TruthRetriever
 from brrp_cli.shapes import solids
 
@@ -64,7 +64,8 @@ def result(folder, truth):
 def test_stored_objects_are_reconstructed_as_they_are(result, truth, object_id):
     item = next(o for o in result.objects if o.object_id == object_id)
     assert item.status == OK and item.surface.as_trimesh().is_watertight
-    assert iou(item.surface, truth[object_id]) > 0.85
+    assert iou(item.surface, truth[object_id]) > 0.95
+    assert item.surface.as_trimesh().volume == pytest.approx(truth[object_id].volume, rel=0.03)
 
 
 def test_the_record_tells_of_evidence_and_weights(result):
@@ -88,15 +89,23 @@ def test_the_best_placement_is_the_true_one(result, truth, folder):
     local = transform_points(np.linalg.inv(true), surface)
     radius, height = np.hypot(*local[:, :2].T), local[:, 2]
     assert radius.max() < 0.045 and height.min() > -0.005 and height.max() < 0.125
-    assert item.retrieved[0].scale == 1.0
+    assert item.retrieved[0].size_factor == 1.0
 
 
-def test_surface_uncertainty_is_in_metres_and_larger_where_nobody_looked(result, truth):
-    item = next(o for o in result.objects if o.object_id == CAN)
+def uncertainty(item):
+    """Mean on the side that faces the camera, and on the other, metres."""
     mesh = item.surface.as_trimesh()
     towards = np.einsum("ij,ij->i", mesh.vertex_normals, -mesh.vertices) > 0
-    assert 0.0005 < np.median(item.surface.uncertainty) < 0.02
-    assert item.surface.uncertainty[~towards].mean() > item.surface.uncertainty[towards].mean()
+    return item.surface.uncertainty[towards].mean(), item.surface.uncertainty[~towards].mean()
+
+
+def test_a_recognised_object_is_known_to_millimetres_on_all_sides(result):
+    """What is not seen of it is known as well as what is."""
+    item = next(o for o in result.objects if o.object_id == CAN)
+    assert item.surface.uncertainty_unit == METRES
+    front, back = uncertainty(item)
+    assert 0.0005 < front < 0.003
+    assert back == pytest.approx(front, rel=0.05)
 
 
 def test_the_same_seed_gives_the_same_bytes(result, folder, truth):
@@ -111,6 +120,8 @@ def test_an_object_that_the_prior_does_not_hold_gets_the_shape_of_what_was_seen(
     strange = in_camera(solids.box(0.20, 0.05, 0.05), placed(0.0, 0.0, 1.3))
     found = reconstruct(photograph({STRANGE: strange}), open_prior(folder)).objects[0]
     assert found.unknown_weight > 0.5
+    front, back = uncertainty(found)
+    assert 0.0005 < front < back < 0.05, "less is known of what nobody saw"
     assert iou(found.surface, strange) > 0.6
 
 

@@ -17,11 +17,19 @@ from sphere_method import METHOD, SphereConfig
 from tiny_scenes import write_meshes, write_scene
 
 import brrp_cli
-from brrp_cli import Reconstructor, open_posterior, open_result, read_frame, reconstruct
+from brrp_cli import (
+    Reconstructor,
+    load_config,
+    open_posterior,
+    open_result,
+    read_frame,
+    reconstruct,
+)
 from brrp_cli.config import preset
 from brrp_cli.errors import BrrpError
 from brrp_cli.methods.registry import METHODS
 
+LEVEL = SphereConfig().surface.level
 ROOT = Path(brrp_cli.__file__).parents[1]
 
 
@@ -84,7 +92,7 @@ def test_its_posterior_reads_and_writes_itself(registered, out):
     found = open_posterior(out / "posterior.h5")
     assert set(found) == {4, 9} and found[4].width is found[9].width
     mesh = trimesh.load_mesh(out / "object_9.ply", process=False)
-    np.testing.assert_allclose(found[9].probability(mesh.vertices), 0.4, atol=0.02)
+    np.testing.assert_allclose(found[9].probability(mesh.vertices), LEVEL, atol=0.02)
     with h5py.File(out / "posterior.h5") as file:
         assert list(file["shared"]) == ["width"], "what all objects have is written once"
     assert open_result(out).posteriors[4].radius == found[4].radius
@@ -106,6 +114,32 @@ def test_eval_measures_it_in_its_workers(place):
     assert len(iou) == 4 and iou["tight", "9"] > 0.4
     assert iou["half", "9"] < 0.5 * iou["tight", "9"]
     assert "sphere tight" in (place / "eval" / "report.md").read_text()
+
+
+def test_a_file_configures_it_everywhere(registered, place):
+    path = place / "mine.toml"
+    path.write_text('method = "sphere"\nshare = 0.5\n[surface]\nspacing = 0.004\n')
+    frame = place / "scenes/a/0000"
+    options = ["--method", "sphere", "--config", path]
+    done = command(place, "reconstruct", frame, *options, "-o", place / "configured")
+    assert done.returncode == 0, done.stderr
+    record = json.loads((place / "configured" / "result.json").read_text())
+    assert record["config"]["share"] == 0.5 and record["config"]["surface"]["spacing"] == 0.004
+    assert record["segmentation"] is None, "its masks came with it"
+    result = reconstruct(
+        read_frame(frame), method="sphere", config=load_config(path, method="sphere")
+    )
+    mesh = trimesh.load_mesh(place / "configured" / "object_9.ply", process=False)
+    vertices = result.objects[1].surface.vertices
+    np.testing.assert_array_equal(mesh.vertices, vertices.astype(np.float32))
+    where = ["--data-root", place / "data", "-o", place / "compared", "--workers", 1]
+    done = command(place, "eval", place / "scenes", *options, "--preset", "tight,half", *where)
+    assert done.returncode == 0, done.stderr
+    with (place / "compared" / "metrics.csv").open(newline="") as stream:
+        iou = {(r["preset"], r["object_id"]): r["iou"] for r in csv.DictReader(stream)}
+    # The file says what sets the presets apart, so that they are one.
+    assert set(iou) == {(f"{p}+mine", i) for p in ("tight", "half") for i in ("4", "9")}
+    assert iou["tight+mine", "9"] == iou["half+mine", "9"]
 
 
 def test_help_tells_of_it(place):

@@ -38,7 +38,9 @@ def contents(folder: Path) -> dict[str, str]:
             parts += [cloud.points, cloud.normals, cloud.fpfh]
         for pose in item.poses:
             parts += [pose.T_plane_object, np.array(pose.probability)]
-        parts += [item.distances.lower, item.distances.values]
+        shape = item.shape
+        parts += [shape.vertices, shape.faces, shape.colours]
+        parts += [shape.field.lower, np.array(shape.field.spacing), shape.field.values]
         for part in parts:
             digest.update(np.ascontiguousarray(part).tobytes())
         found[name] = digest.hexdigest()

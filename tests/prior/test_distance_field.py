@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 
 import h5py
 import numpy as np
 import pytest
 import trimesh
-from stored_example import example
+from stored_example import example, with_field
 
 from brrp_cli.errors import PriorError
 from brrp_cli.prior.distance_field import DistanceField, distance_field
@@ -115,13 +114,13 @@ def test_at_the_nodes_the_values_stand_as_they_are():
 
 @pytest.fixture
 def shard(tmp_path: Path, plate: DistanceField) -> Path:
-    write_shard(tmp_path / "shard.h5", [pack(replace(example(), distances=plate), "aa")], {})
+    write_shard(tmp_path / "shard.h5", [pack(with_field(example(), plate), "aa")], {})
     return tmp_path / "shard.h5"
 
 
 def test_a_shard_gives_the_field_back_as_it_was(shard, plate):
     with open_shard(shard) as file:
-        found = unpack(read_stored(file, "cup"), "a cup").distances
+        found = unpack(read_stored(file, "cup"), "a cup").shape.field
     np.testing.assert_array_equal(found.lower, plate.lower)
     assert found.spacing == plate.spacing
     np.testing.assert_array_equal(found.values, plate.values)
@@ -194,7 +193,7 @@ def test_a_field_that_is_no_lattice_is_refused_though_its_checksum_is_right(
     tmp_path, spacing, shape
 ):
     field = DistanceField(np.zeros(3), spacing, np.zeros(shape, np.float32))
-    write_shard(tmp_path / "bad.h5", [pack(replace(example(), distances=field), "aa")], {})
+    write_shard(tmp_path / "bad.h5", [pack(with_field(example(), field), "aa")], {})
     with (
         pytest.raises(PriorError, match="without a grid"),
         open_shard(tmp_path / "bad.h5") as file,

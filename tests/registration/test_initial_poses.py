@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from table_scene import NORMAL, TABLE, box, in_camera, photograph, placed, stored
 
-from brrp_cli.config import FeatureConfig, RegistrationConfig
+from brrp_cli.config import FeatureConfig, RegistrationConfig, SearchConfig
 from brrp_cli.geometry import normalise, transform_points
 from brrp_cli.observation.support_plane import Plane, plane_frame
 from brrp_cli.registration.initial_poses import feature_matched_poses, resting_initial_poses
@@ -16,6 +16,7 @@ from brrp_cli.registration.model import search_model
 from brrp_cli.registration.scale_scan import observed_cloud
 
 BOX, TURNS = 5, 12
+CONFIG = SearchConfig(turns=TURNS)
 FEATURES = FeatureConfig(scales=(0.4, 0.5, 0.6))
 
 
@@ -33,7 +34,7 @@ def model():
 
 @pytest.fixture(scope="module")
 def starts(model, points):
-    return resting_initial_poses(model, points, TABLE, TURNS)
+    return resting_initial_poses(model, points, TABLE, CONFIG)
 
 
 @pytest.mark.parametrize(
@@ -134,7 +135,7 @@ def test_where_more_is_hidden_each_end_is_tried_as_the_seen_one(model, points, p
 
 def test_a_stray_point_moves_no_start(model, points, starts):
     stray = np.concatenate([points[:1] + [0.3, 0.0, 0.2], points])
-    again = resting_initial_poses(model, stray, TABLE, TURNS)
+    again = resting_initial_poses(model, stray, TABLE, CONFIG)
     assert len(again) == len(starts)
     np.testing.assert_allclose(again, starts, atol=2e-3)
 

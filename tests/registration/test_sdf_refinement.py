@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
-from stored_example import example
+from stored_example import example, with_field
 
 from brrp_cli.config import RegistrationConfig
 from brrp_cli.geometry import similarity, transform_points
@@ -37,7 +35,7 @@ def field():
 @pytest.fixture(scope="module")
 def model(field):
     nothing = np.zeros((0, 3))
-    return Model(replace(example("box"), half_extent=1.0, distances=field), nothing, nothing)
+    return Model(with_field(example("box"), field, half_extent=1.0), nothing, nothing)
 
 
 @pytest.fixture(scope="module")
@@ -87,6 +85,71 @@ def test_a_placement_that_nothing_pulls_stays(model, surface):
     found = refine_to_sdf(np.stack([far, np.eye(4)]), surface, model, 0.01, 15)
     np.testing.assert_array_equal(found[0], far)
     np.testing.assert_allclose(found[1], np.eye(4), atol=2e-3)
+
+
+def size_of(T_model_cam):
+    """Of what was seen, in the model's size."""
+    return np.cbrt(np.linalg.det(T_model_cam[:3, :3])) ** -1
+
+
+@pytest.mark.parametrize("size", [0.85, 1.0, 1.2])
+@pytest.mark.parametrize("noise", [0.0, 0.001])
+def test_a_box_of_another_size_gets_its_size(model, surface, size, noise):
+    """Seen from all sides."""
+    T_cam_true = moved(7, 40, 0.3)
+    T_cam_true[:3, :3] *= size
+    surface = np.concatenate([surface, -surface])
+    error = np.random.default_rng(2).normal(0, noise, (600, 3))
+    observed = transform_points(T_cam_true, surface) + error
+    # Rigid starts: nothing says how large it is.
+    rigid = moved(7, 40, 0.3)
+    starts = np.stack([moved(seed, 5, 0.004) @ np.linalg.inv(rigid) for seed in range(4)])
+    found = refine_to_sdf(starts, observed, model, 0.03, 25, resize=True)
+    for T in found:
+        assert size_of(T) == pytest.approx(size, rel=0.01)
+        placed_at = transform_points(T, transform_points(T_cam_true, surface))
+        assert np.abs(box_distance(placed_at)).mean() < 3e-4
+
+
+def test_noise_makes_nothing_larger(model, surface):
+    """Three faces of a box leave its size open: any larger one has the same. Where nothing speaks
+    for another size, it stays."""
+    T_cam_true = moved(7, 40, 0.3)
+    for seed in range(3):
+        error = np.random.default_rng(seed).normal(0, 0.001, (300, 3))
+        observed = transform_points(T_cam_true, surface) + error
+        start = np.linalg.inv(T_cam_true)[None]
+        (found,) = refine_to_sdf(start, observed, model, 0.03, 25, resize=True)
+        assert size_of(found) == pytest.approx(1.0, abs=0.05)
+
+
+@pytest.mark.parametrize("radius", [0.025, 0.036])
+def test_a_ball_of_another_size_gets_its_size_from_its_front(radius):
+    """The model's radius is 3 cm; a cap of the front is seen."""
+    spacing = 0.0025
+    axis = np.arange(-0.06, 0.06 + spacing, spacing)
+    nodes = np.stack(np.meshgrid(axis, axis, axis, indexing="ij"), axis=-1)
+    distance = (np.linalg.norm(nodes, axis=-1) - 0.03).astype(np.float32)
+    field = DistanceField(np.full(3, axis[0]), spacing, distance)
+    nothing = np.zeros((0, 3))
+    ball = Model(with_field(example("ball"), field, half_extent=1.0), nothing, nothing)
+    directions = np.random.default_rng(0).normal(size=(2000, 3))
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    center = np.array([0.1, 0.0, 0.7])
+    observed = center + radius * directions[directions[:, 2] < -0.3]
+    start = similarity(translation=-center + [0.003, -0.002, 0.004])
+    (found,) = refine_to_sdf(start[None], observed, ball, 0.03, 25, resize=True)
+    assert size_of(found) * 0.03 == pytest.approx(radius, rel=0.01)
+    # A ball's middle is where its surface says.
+    np.testing.assert_allclose(transform_points(found, center), 0, atol=3e-4)
+
+
+def test_without_resizing_a_placement_keeps_its_size(model, surface):
+    """Though another would fit better."""
+    (found,) = refine_to_sdf(np.eye(4)[None], 1.2 * surface, model, 0.03, 15)
+    assert size_of(found) == pytest.approx(1.0, abs=1e-9)
+    (resized,) = refine_to_sdf(np.eye(4)[None], 1.2 * surface, model, 0.03, 15, resize=True)
+    assert size_of(resized) == pytest.approx(1.2, rel=0.01)
 
 
 CONFIG = RegistrationConfig(iterations=3000)

@@ -37,7 +37,7 @@ def inferred() -> ObjectReconstruction:
         ("unknown_weight", "Inference"),
         ("probability", "Registration of cup"),
         ("T_cam_object", "Registration of cup"),
-        ("scale", "Registration of cup"),
+        ("size_factor", "Registration of cup"),
         ("fitness", "Registration of cup"),
         ("alignment_score", "Registration of cup"),
         ("weight", "Registration of cup"),

@@ -1,11 +1,12 @@
 import numpy as np
 import pytest
 
+from brrp_cli.config.retrieval import FusionConfig, IlluminantsConfig
 from brrp_cli.retrieval.base import unknown
 from brrp_cli.retrieval.illuminants import lights, local_lights, log_prior
-from brrp_cli.retrieval.score_fusion import Similarity, Weights, believe
+from brrp_cli.retrieval.score_fusion import Similarity, believe
 
-WEIGHTS = Weights(colour=20.0, pairs=20.0, size=0.5, offset=8.0)
+WEIGHTS = FusionConfig(colour=20.0, pairs=20.0, size=0.5, offset=8.0)
 FLAT, SAME = np.zeros(2), np.eye(2)
 
 
@@ -55,8 +56,9 @@ def test_objects_that_were_not_looked_at_have_no_probability():
 
 
 def test_lights_are_near_each_other():
-    gains = lights()
-    prior, local = log_prior(gains), local_lights(gains)
+    gains = lights(IlluminantsConfig())
+    lit = IlluminantsConfig()
+    prior, local = log_prior(gains, lit), local_lights(gains, lit)
     plain = int(np.abs(np.log(gains)).sum(axis=1).argmin())
     assert prior[plain] > prior.max() - 0.2
     np.testing.assert_allclose(local.sum(axis=1), 1)

@@ -1,15 +1,16 @@
 import numpy as np
 import pytest
 
+from brrp_cli.config.retrieval import RetrievalConfig, SimilarityConfig
 from brrp_cli.descriptors.colour_histogram import COLOUR_BINS
 from brrp_cli.descriptors.descriptor import to_bytes
 from brrp_cli.descriptors.point_pairs import PAIR_BINS
 from brrp_cli.prior.appearance_index import first_look
 from brrp_cli.retrieval.observed_appearance import SeenObject
-from brrp_cli.retrieval.score_fusion import NEUTRAL_COLOUR
-from brrp_cli.retrieval.shortlist import CLOSELY, Shortlist
+from brrp_cli.retrieval.shortlist import Shortlist
 from brrp_cli.retrieval.similarity import colour_likeness, pair_likeness, size_penalty
 
+LIKE = SimilarityConfig()
 POSES = np.array([[[0.2, 0.1, 0.05], [0.05, 0.2, 0.1]]], np.float32)
 
 
@@ -26,21 +27,23 @@ POSES = np.array([[[0.2, 0.1, 0.05], [0.05, 0.2, 0.1]]], np.float32)
     ],
 )
 def test_what_is_seen_may_be_smaller_but_not_larger(size, hidden, fits):
-    penalty = float(size_penalty(np.array(size), POSES, hidden)[0])
+    penalty = float(size_penalty(np.array(size), POSES, hidden, LIKE)[0])
     assert penalty > -1 if fits else penalty < -4
 
 
 def test_missing_poses_and_sizes_say_nothing():
     padded = np.concatenate([POSES, np.full((1, 3, 3), np.nan, np.float32)], axis=1)
     size = np.array([0.18, 0.1, 0.05])
-    np.testing.assert_array_equal(size_penalty(size, padded, 0), size_penalty(size, POSES, 0))
-    assert size_penalty(None, POSES, 0).tolist() == [0]
+    np.testing.assert_array_equal(
+        size_penalty(size, padded, 0, LIKE), size_penalty(size, POSES, 0, LIKE)
+    )
+    assert size_penalty(None, POSES, 0, LIKE).tolist() == [0]
 
 
 def test_the_best_view_counts():
     rng = np.random.default_rng(0)
     views = rng.dirichlet(np.full(COLOUR_BINS, 0.05), (3, 4))
-    found = colour_likeness(views[:, 2], to_bytes(views), 3)
+    found = colour_likeness(views[:, 2], to_bytes(views), 3, LIKE)
     np.testing.assert_allclose(np.diag(found), 1, atol=0.02)
     expected = np.einsum("gb,mvb->gmv", np.sqrt(views[:, 2]), np.sqrt(views)).max(axis=-1)
     np.testing.assert_allclose(found, expected, atol=0.02)
@@ -51,9 +54,9 @@ def test_objects_without_colours_are_neither_preferred_nor_refused():
     stored[1, :, 5] = 255
     seen = np.eye(COLOUR_BINS)[[5, 6]]
     np.testing.assert_allclose(
-        colour_likeness(seen, stored, 2), [[NEUTRAL_COLOUR, 1], [NEUTRAL_COLOUR, 0]]
+        colour_likeness(seen, stored, 2, LIKE), [[LIKE.neutral_colour, 1], [LIKE.neutral_colour, 0]]
     )
-    np.testing.assert_allclose(colour_likeness(None, stored, 4), NEUTRAL_COLOUR)
+    np.testing.assert_allclose(colour_likeness(None, stored, 4, LIKE), LIKE.neutral_colour)
 
 
 def test_a_shortlist_of_a_large_prior_holds_the_true_object():
@@ -72,11 +75,15 @@ def test_a_shortlist_of_a_large_prior_holds_the_true_object():
     table["colour"] = to_bytes(colour * np.ones((views, 1)))
     table["pairs"] = to_bytes(pairs * np.ones((views, 1)))
     table["sizes"] = rng.uniform(0.02, 0.3, (count, 2, 3))
-    shortlist = Shortlist(first_look(table))
+    shortlist = Shortlist(first_look(table), RetrievalConfig())
     for true in (7, 1234, 2999):
         size = table["sizes"][true, 0].astype(float)
         seen = SeenObject(None, None, pairs[true, 0].astype(np.float32), size, 0.0)
         histograms = np.repeat(colour[true], 9, axis=0).astype(np.float32)
         rows = shortlist.rows(seen, histograms)
-        assert len(rows) == CLOSELY and true in rows and (np.diff(rows) > 0).all()
-        assert float(pair_likeness(seen.pairs, table["pairs"][[true]])[0]) > 0.98
+        assert (
+            len(rows) == RetrievalConfig().shortlist.closely
+            and true in rows
+            and (np.diff(rows) > 0).all()
+        )
+        assert float(pair_likeness(seen.pairs, table["pairs"][[true]], LIKE)[0]) > 0.98

@@ -4,6 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from brrp_cli.config.segmentation import (
+    ComponentsConfig,
+    ConcaveEdgesConfig,
+    SmoothDepthConfig,
+)
 from brrp_cli.geometry import backproject
 from brrp_cli.segmentation.components import absorb_small, find_parts, join_parts
 from brrp_cli.segmentation.concave_edges import depth_jumps, hollow_creases, surface_normals
@@ -11,6 +16,8 @@ from brrp_cli.segmentation.region_growing import fill_holes
 from brrp_cli.segmentation.smooth_depth import flying_pixels, smooth_depth
 
 K = np.array([[200.0, 0, 40], [0, 200.0, 30], [0, 0, 1]])
+
+EDGES, PARTS, SMOOTH = ConcaveEdgesConfig(), ComponentsConfig(), SmoothDepthConfig()
 
 
 def roof(slope):
@@ -21,7 +28,9 @@ def roof(slope):
 
 
 def test_a_valley_is_a_hollow_crease_and_a_ridge_is_none():
-    valley, ridge = (hollow_creases(p, surface_normals(p)) for p in (roof(-1.5), roof(1.5)))
+    valley, ridge = (
+        hollow_creases(p, surface_normals(p, EDGES), EDGES) for p in (roof(-1.5), roof(1.5))
+    )
     assert (valley[10:50, 40] == 1).all()
     assert valley[10:50, 10:30].max() == 0
     assert ridge.max() == 0
@@ -29,7 +38,7 @@ def test_a_valley_is_a_hollow_crease_and_a_ridge_is_none():
 
 def test_normals_look_at_the_camera():
     points = roof(0.7)
-    normals = surface_normals(points)[10:50, 10:30]
+    normals = surface_normals(points, EDGES)[10:50, 10:30]
     assert (np.sum(normals * points[10:50, 10:30], axis=-1) < 0).all()
     assert np.allclose(np.linalg.norm(normals, axis=-1), 1)
 
@@ -37,34 +46,34 @@ def test_normals_look_at_the_camera():
 def test_jumps_are_marked_on_both_sides_and_slopes_are_not():
     depth = np.ones((20, 20))
     depth[:, 10:] = 1.1
-    assert np.unique(np.nonzero(depth_jumps(depth, K))[1]).tolist() == [9, 10]
+    assert np.unique(np.nonzero(depth_jumps(depth, K, EDGES))[1]).tolist() == [9, 10]
     ramp = 1 + 0.02 * np.arange(20.0)[:, None] + np.zeros((20, 20))
-    assert not depth_jumps(ramp, K).any()
-    assert not depth_jumps(np.full((20, 20), np.nan), K).any()
+    assert not depth_jumps(ramp, K, EDGES).any()
+    assert not depth_jumps(np.full((20, 20), np.nan), K, EDGES).any()
 
 
 def test_smoothing_keeps_planes_and_edges_and_takes_noise():
     v, u = np.mgrid[:60, :80]
     plane = 1 / (1.0 + 0.002 * u + 0.001 * v)
-    assert np.allclose(smooth_depth(plane)[5:-5, 5:-5], plane[5:-5, 5:-5], rtol=1e-4)
+    assert np.allclose(smooth_depth(plane, SMOOTH)[5:-5, 5:-5], plane[5:-5, 5:-5], rtol=1e-4)
     step = np.where(u < 40, 0.8, 1.2)
-    assert np.allclose(smooth_depth(step), step, rtol=1e-6)
+    assert np.allclose(smooth_depth(step, SMOOTH), step, rtol=1e-6)
     noise = np.random.default_rng(0).normal(0, 0.003, plane.shape)
-    assert np.std((smooth_depth(plane + noise) - plane)[5:-5, 5:-5]) < 0.003 / 3
+    assert np.std((smooth_depth(plane + noise, SMOOTH) - plane)[5:-5, 5:-5]) < 0.003 / 3
     holed = plane.copy()
     holed[30, 40] = np.nan
-    assert np.isnan(smooth_depth(holed)[30, 40])
-    assert np.isfinite(smooth_depth(holed)).sum() == holed.size - 1
+    assert np.isnan(smooth_depth(holed, SMOOTH)[30, 40])
+    assert np.isfinite(smooth_depth(holed, SMOOTH)).sum() == holed.size - 1
 
 
 def test_pixels_between_two_surfaces_fly_and_those_of_a_slope_do_not():
     depth = np.where(np.arange(80) < 40, 0.8, 1.2) + np.zeros((60, 80))
     depth[:, 40] = 1.0
-    flying = flying_pixels(depth)
+    flying = flying_pixels(depth, SMOOTH)
     assert flying[:, 40].all()
     assert not flying[:, :38].any()
     assert not flying[:, 43:].any()
-    assert not flying_pixels(1 / (1 + 0.004 * np.arange(80.0)) + np.zeros((60, 80))).any()
+    assert not flying_pixels(1 / (1 + 0.004 * np.arange(80.0)) + np.zeros((60, 80)), SMOOTH).any()
 
 
 def test_parts_end_at_boundaries_and_necks_do_not_join_them():
@@ -72,13 +81,13 @@ def test_parts_end_at_boundaries_and_necks_do_not_join_them():
     mask[4:16, 2:18] = mask[4:16, 24:40] = True
     wall = np.zeros(mask.shape)
     mask[9:11, 18:24] = True
-    parts = join_parts(find_parts(mask, wall), wall, 0.45)
+    parts = join_parts(find_parts(mask, wall, PARTS), wall, 0.45, PARTS)
     assert parts[6, 6] != parts[6, 30]
     assert (parts[mask] > 0).all()
     mask[4:16, 18:24] = True
-    assert len(np.unique(join_parts(find_parts(mask, wall), wall, 0.45)[mask])) == 1
+    assert len(np.unique(join_parts(find_parts(mask, wall, PARTS), wall, 0.45, PARTS)[mask])) == 1
     wall[:, 20:22] = 1
-    parts = join_parts(find_parts(mask, wall), wall, 0.45)
+    parts = join_parts(find_parts(mask, wall, PARTS), wall, 0.45, PARTS)
     assert parts[6, 6] != parts[6, 30]
 
 

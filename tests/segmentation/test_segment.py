@@ -9,6 +9,7 @@ import pytest
 import trimesh
 from table_scene import T_CAM_WORLD, in_camera, photograph
 
+from brrp_cli.config.segmentation import ConcavitiesConfig, VividColourConfig
 from brrp_cli.errors import FrameError
 from brrp_cli.frames.build import make_frame
 from brrp_cli.segmentation.fill_concavities import fill_inside
@@ -73,11 +74,11 @@ def test_a_bowls_floor_is_filled_and_the_crook_of_a_bend_is_not():
     radius = np.linalg.norm(plan - 0.1, axis=-1)
     everywhere = np.ones((100, 100), bool)
     ring = ((radius > 0.06) & (radius < 0.08)).astype(np.int64) * 5
-    assert fill_inside(ring, plan, everywhere)[50, 50] == 5
-    assert (fill_inside(ring, plan, everywhere)[radius > 0.085] == 0).all()
-    assert np.array_equal(fill_inside(ring, plan, ~everywhere), ring)
+    assert fill_inside(ring, plan, everywhere, ConcavitiesConfig())[50, 50] == 5
+    assert (fill_inside(ring, plan, everywhere, ConcavitiesConfig())[radius > 0.085] == 0).all()
+    assert np.array_equal(fill_inside(ring, plan, ~everywhere, ConcavitiesConfig()), ring)
     half = np.where(plan[..., 0] < 0.1, ring, 0)
-    assert fill_inside(half, plan, everywhere)[50, 49] == 0
+    assert fill_inside(half, plan, everywhere, ConcavitiesConfig())[50, 49] == 0
 
 
 def boxes(*placed):
@@ -123,10 +124,13 @@ def test_hues_are_of_vivid_parts_alone_and_go_round():
     rgb[2, ::2], rgb[2, 1::2] = (200, 0, 10), (200, 10, 0)
     rgb[3, ::2], rgb[3, 1::2] = (200, 0, 0), (0, 0, 200)
     rgb[4] = 10, 200, 10
-    hues = vivid_hues(parts, rgb)
+    colour = VividColourConfig()
+    hues = vivid_hues(parts, rgb, colour)
     assert np.isnan(hues[[0, 1, 3]]).all()
-    assert same_hue(hues[2], 355.0) and same_hue(hues[4], 120.0)
-    assert not same_hue(hues[2], hues[4]) and not same_hue(hues[1], hues[1])
+    assert same_hue(hues[2], 355.0, colour) and same_hue(hues[4], 120.0, VividColourConfig())
+    assert not same_hue(hues[2], hues[4], colour) and not same_hue(
+        hues[1], hues[1], VividColourConfig()
+    )
 
 
 def test_a_thin_thing_is_found():

@@ -7,12 +7,12 @@ from pathlib import Path
 
 import numpy as np
 import trimesh
-from brrp_cli.inference.prior_mean import PriorMeanGrid
 from table_scene import TABLE, in_camera, photograph, placed
 
-from brrp_cli.config import SurfaceConfig, preset
+from brrp_cli.config import preset
 from brrp_cli.inference.hinge import HingeGrid
 from brrp_cli.inference.hypothesis_posterior import HypothesisPosterior
+from brrp_cli.inference.mean_grid import MeanGrid
 from brrp_cli.inference.posterior import HilbertPosterior
 from brrp_cli.raycast import raycasting_scene
 from brrp_cli.reconstruction import (
@@ -61,13 +61,16 @@ def posterior_on(
     shape = np.ceil((bounds[1] - bounds[0]) / spacing).astype(int) + 1
     axes = [low + spacing * np.arange(n) for low, n in zip(bounds[0], shape, strict=True)]
     nodes = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
-    values = np.stack([np.clip(f(nodes), -8, 8).reshape(shape) for f in functions])
+    means = tuple(
+        MeanGrid(bounds[0], spacing, np.clip(f(nodes), -8, 8).reshape(shape).astype("f2"), -8.0)
+        for f in functions
+    )
     grid = HingeGrid((0.0, 0.0, 0.0), (1, 1, 1), 1.0, 1e-7)
     none = HilbertPosterior(
         np.zeros((len(which), grid.dimension), np.float32), bounds.mean(axis=0), grid, 1.0
     )
-    mean = PriorMeanGrid(bounds[0], spacing, values.astype(np.float16), outside=-8.0)
-    return HypothesisPosterior(mean, np.array(which), none)
+    shares = np.full(len(which), 1 / len(which))
+    return HypothesisPosterior(means, np.array(which), shares, none, means[0].bounds)
 
 
 def around(mesh: trimesh.Trimesh) -> HypothesisPosterior:
@@ -88,8 +91,7 @@ def write_made_result(folder: Path, *, frame: str = "camera") -> Path:
     segmap = seen.segmap.copy()
     segmap[-2:, :2] = SPECK
     seen = replace(seen, segmap=segmap)
-    # At a half the mesh is the true surface.
-    config = replace(preset("default"), surface=SurfaceConfig(level=0.5))
+    config = preset("default")
     objects = [ObjectReconstruction(SPECK, TOO_FEW_POINTS, "4 valid depth points, 16 are needed")]
     for object_id, mesh in meshes.items():
         item = ObjectReconstruction(

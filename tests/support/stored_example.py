@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from typing import Any
+
 import numpy as np
 
 from brrp_cli.descriptors.colour_histogram import COLOUR_BINS
@@ -10,6 +13,7 @@ from brrp_cli.descriptors.fpfh import FeatureCloud
 from brrp_cli.descriptors.point_pairs import PAIR_BINS
 from brrp_cli.prior.distance_field import DistanceField
 from brrp_cli.prior.objects import PriorObject, RestingPose
+from brrp_cli.prior.shape import StoredShape
 
 
 def example(name: str = "cup", seed: int = 0) -> PriorObject:
@@ -37,10 +41,20 @@ def example(name: str = "cup", seed: int = 0) -> PriorObject:
             pairs=rng.integers(0, 256, (5, PAIR_BINS), dtype=np.uint8),
             sizes=rng.random((2, 3), dtype=np.float32),
         ),
-        distances=DistanceField(
-            lower=np.array([-1.5, -1.25, -0.75]),
-            spacing=0.5,
-            # As a shard keeps them, in half precision.
-            values=rng.normal(size=(7, 6, 4)).astype(np.float16).astype(np.float32),
+        shape=StoredShape(
+            vertices=rng.normal(size=(30, 3)).astype(np.float32),
+            faces=rng.integers(0, 30, (40, 3), dtype=np.int32),
+            colours=rng.integers(0, 256, (30, 3), dtype=np.uint8),
+            field=DistanceField(
+                lower=np.array([-1.5, -1.25, -0.75]),
+                spacing=0.5,
+                # As a shard keeps them, in half precision.
+                values=rng.normal(size=(7, 6, 4)).astype(np.float16).astype(np.float32),
+            ),
         ),
     )
+
+
+def with_field(item: PriorObject, field: DistanceField, **changes: Any) -> PriorObject:
+    """The same with another field of distances."""
+    return replace(item, shape=replace(item.shape, field=field), **changes)

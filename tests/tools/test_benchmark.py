@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 import torch
 from benchmark import main
-from brrp_cli.prior.build.build.build import build_prior
 from click.testing import CliRunner
 from plain.density import dense_features, gradient, hinge_points, log_posterior, mean_bce
 from plain.svgd import stein_direction as plain_direction
@@ -19,6 +18,7 @@ from brrp_cli.frames.npz import save_frame
 from brrp_cli.inference.density import Lambdas, Samples, log_density, logistic_score
 from brrp_cli.inference.hinge import HingeGrid, cubic_grid, factors, features
 from brrp_cli.inference.svgd import stein_direction
+from brrp_cli.prior.build.build import build_prior
 from brrp_cli.prior.parameters import BuildParameters
 
 PER_AXIS, HALF_WIDTH, FLOOR = 5, 0.15, 1e-7

@@ -238,3 +238,28 @@ def test_existing_scenes_are_kept_and_mistakes_are_told(data, made, tmp_path):
     )
     assert bad.exit_code == 1
     assert "flat.obj" in bad.output
+
+
+def test_a_sensor_changes_depth_alone_and_repeats_its_bytes(data, made):
+    pytest.importorskip("cv2")
+    clean = bytes_of(made / "00000000")
+    depths = set()
+    for sensor in ("stereo", "xtion", "kinect-azure"):
+        for folder in (sensor, f"{sensor}_again"):
+            result = generate(data, data / folder, "--scenes", 1, "--sensor", sensor)
+            assert result.exit_code == 0, result.output
+        measured = bytes_of(data / sensor / "00000000")
+        assert measured == bytes_of(data / f"{sensor}_again" / "00000000")
+        assert {p.name for p in clean if clean[p] != measured[p]} == {"depth.npy"}
+        depths.add(measured[Path("0000/depth.npy")])
+        before, after = (
+            np.load(folder / "00000000" / "0000" / "depth.npy") for folder in (made, data / sensor)
+        )
+        assert 0.5 < ((after < 1) & (before < 1)).mean() / (before < 1).mean() < 1
+    assert len(depths) == 3
+
+
+def test_noise_and_sensor_exclude_each_other(data, tmp_path):
+    both = generate(data, tmp_path / "s", "--noise", "structured-light", "--sensor", "xtion")
+    assert both.exit_code == 2
+    assert "exclude each other" in both.output

@@ -13,7 +13,6 @@ import torch
 
 from brrp_cli.completion.point_features import COUNT
 from brrp_cli.config import Config
-from brrp_cli.registration.model import COARSE
 from brrp_cli.threads import cores
 
 TRIES = 5
@@ -64,7 +63,7 @@ def limits(machine: Machine, config: Config, samples: int) -> dict[str, Limit]:
     search, fitted, nodes = hypotheses.search, hypotheses.map, hypotheses.mean.nodes
 
     starts = search.matchings + 8 * search.turns
-    judged = (starts + search.coarse + search.middle) * (COARSE + search.seen_points)
+    judged = (starts + search.coarse + search.middle) * (search.model_points + search.seen_points)
     judged += (search.fine + len(search.scales) * search.rescaled) * 2 * search.fine_points
     slid = (
         search.coarse * search.coarse_points * search.coarse_steps

@@ -14,23 +14,25 @@ from brrp_cli.errors import SceneError
 from brrp_cli.files import atomic_folder
 from brrp_cli.frames.published import depth_from_buffer, intrinsics_from_projection
 from brrp_cli.seeds import child_rng
-from tabletop.check import CLEAN, STRUCTURED_LIGHT, Distance, check_scene
+from tabletop.check import CLEAN, SENSOR, SENSOR_PIXELS, STRUCTURED_LIGHT, Distance, check_scene
 from tabletop.light import draw_light, relight
 from tabletop.models import Model, load_model
 from tabletop.render import FAR, NEAR, NOTHING, Camera, Picture, draw_camera, draw_look, render
 from tabletop.settle import Pose, drop
+from tabletop.stage import Stage, stage_of
 
 FEWEST, MOST = 3, 10
 MAX_DRAWS = 20
 LIMITS = {"none": CLEAN, "structured-light": STRUCTURED_LIGHT}
 LIGHTS = ("plain", "varied")
+SENSOR_NAMES = ("none", "stereo", "xtion", "kinect-azure")
 JPEG_QUALITY = 95
 
 
 @dataclass(frozen=True)
 class Plan:
     """What all scenes of a set share. `noise`: a key of `LIMITS`; `light`: one of `LIGHTS`;
-    `size`: (width, height)."""
+    `size`: (width, height); `sensor`: one of `SENSOR_NAMES`, instead of noise."""
 
     meshes: tuple[Path, ...]
     data_root: Path
@@ -41,13 +43,21 @@ class Plan:
     size: tuple[int, int]
     overwrite: bool
     light: str = "plain"
+    sensor: str = "none"
+
+
+def check_depth(folder: Path, data_root: Path, noise: str, sensor: str) -> list[Distance]:
+    """`check_scene` with what such depth allows."""
+    if sensor == "none":
+        return check_scene(folder, data_root, LIMITS[noise])
+    return check_scene(folder, data_root, SENSOR, SENSOR_PIXELS)
 
 
 def make_scene(plan: Plan, number: int, check: bool) -> list[Distance]:
     """Write scene `number`; it depends on the plan's meshes and seed and on the number alone.
 
-    Noise and light have random numbers of their own, so that a noisy or lit set shows the scenes of
-    the clean one.
+    Noise, sensor and light have random numbers of their own, so that a noisy or lit set shows the
+    scenes of the clean one.
 
     Errors: SceneError if the check fails or no draw leaves enough objects on the table.
     """
@@ -79,8 +89,18 @@ def make_scene(plan: Plan, number: int, check: bool) -> list[Distance]:
             if plan.noise != "none":
                 noise_rng = child_rng(plan.seed, "scene", number, "noise", i)
                 depth = noisy_buffer(depth, camera.projection, noise_rng)
+            if plan.sensor != "none":
+                K = intrinsics_from_projection(camera.projection, depth.shape)
+                # The same materials in every view.
+                material_rng = child_rng(plan.seed, "scene", number, "materials")
+                stage = stage_of(
+                    models, poses, look.object_colors, camera, K, depth.shape, material_rng
+                )
+                depth = measured_buffer(
+                    plan.sensor, stage, child_rng(plan.seed, "scene", number, "sensor", i)
+                )
             write_view(partial / f"{i:04d}", picture, depth, camera)
-        return check_scene(partial, plan.data_root, LIMITS[plan.noise]) if check else []
+        return check_depth(partial, plan.data_root, plan.noise, plan.sensor) if check else []
 
 
 def draw_objects(
@@ -119,7 +139,19 @@ def noisy_buffer(
     """The depth buffer of a structured-light camera; a pixel without return is on the far plane."""
     clean = np.nan_to_num(depth_from_buffer(buffer, projection))
     K = intrinsics_from_projection(projection, buffer.shape)
-    depth = add_depth_noise(clean, K, rng).astype(np.float64)
+    return buffer_from_depth(add_depth_noise(clean, K, rng).astype(np.float64))
+
+
+def measured_buffer(sensor: str, stage: Stage, rng: np.random.Generator) -> NDArray[np.float32]:
+    """The depth buffer that a camera of `SENSOR_NAMES` would write of a stage."""
+    # OpenCV is needed for these only.
+    from tabletop.sensors import SENSORS
+
+    return buffer_from_depth(SENSORS[sensor](stage, rng))
+
+
+def buffer_from_depth(depth: NDArray[np.float64]) -> NDArray[np.float32]:
+    """Depth (H, W), metres, as a depth buffer; a pixel without return is on the far plane."""
     returned = depth > NEAR
     noisy = FAR / (FAR - NEAR) * (1 - NEAR / np.where(returned, depth, 1.0))
     return np.where(returned & (noisy < 1), noisy, NOTHING).astype(np.float32)

@@ -6,6 +6,7 @@ whose surface lies at 0.3. No prior, no table: nothing but what was seen of each
 
 from __future__ import annotations
 
+import json
 from dataclasses import asdict, dataclass
 from functools import lru_cache, partial
 from pathlib import Path
@@ -16,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brrp_cli.config import PointSDFConfig
+from brrp_cli.config.tables import changed
 from brrp_cli.device import pick_device
 from brrp_cli.files import sha256_file
 from brrp_cli.frames.frame import BACKGROUND, Frame
@@ -48,8 +50,6 @@ NAME = "pointsdf"
 # A logistic distribution's standard deviation over its scale, and the scale of a surface whose
 # logit has a gradient is one over that.
 LOGISTIC = np.pi / np.sqrt(3)
-LARGEST = 0.05  # metres; no surface is less certain than this
-STEP = 0.001  # metres, of difference quotients
 CHUNK = 16_384  # points that go through the network at once
 
 
@@ -68,12 +68,14 @@ class PointSDFPosterior:
     code: NDArray[np.float32]
     center: NDArray[np.float64]
     scale: float
-    half_width: float
+    config: PointSDFConfig
 
     @property
     def bounds(self) -> NDArray[np.float64]:
         """(2, 3) metres, camera frame."""
-        return np.stack([self.center - self.half_width, self.center + self.half_width])
+        return np.stack(
+            [self.center - self.config.half_width, self.center + self.config.half_width]
+        )
 
     def logits(self, points: NDArray[np.floating]) -> NDArray[np.float32]:
         """What the network says (n,) at points (n, 3), metres, camera frame."""
@@ -100,7 +102,7 @@ class PointSDFPosterior:
     def probability_volume(self, axes: Axes) -> NDArray[np.float32]:
         """`probability` (nx, ny, nz) on a grid of camera-frame coordinates, metres; between
         nodes where nothing is likely."""
-        return coarse_to_fine_volume(self.probability, axes)
+        return coarse_to_fine_volume(self.probability, axes, self.config.grid)
 
     def uncertainty(self, points: NDArray[np.floating]) -> NDArray[np.float32]:
         """Variance (n,) of occupancy, p (1 - p): all that a single network can say."""
@@ -118,20 +120,21 @@ class PointSDFPosterior:
         Occupancy is taken to be a logistic function of the way across the surface: the more slowly
         it falls there, the less is known where the surface is.
         """
+        size, largest = self.config.difference_step, self.config.largest_deviation
         slope = [
-            (self.logits(vertices + step) - self.logits(vertices - step)) / (2 * STEP)
-            for step in np.eye(3) * STEP
+            (self.logits(vertices + step) - self.logits(vertices - step)) / (2 * size)
+            for step in np.eye(3) * size
         ]
-        steepness = np.maximum(np.linalg.norm(slope, axis=0), LOGISTIC / LARGEST)
+        steepness = np.maximum(np.linalg.norm(slope, axis=0), LOGISTIC / largest)
         return np.asarray(LOGISTIC / steepness, dtype=np.float32)
 
     def write(self, group: h5py.Group, shared: SharedParts) -> None:
-        """Attributes decoder (its name among what is shared), center (3), scale, half_width; code
-        (C,) float32."""
+        """Attributes decoder (its name among what is shared), center (3), scale, config (JSON);
+        code (C,) float32."""
         group.attrs["decoder"] = shared.write("decoder", self.decoder, write_decoder)
         group.attrs["center"] = self.center
         group.attrs["scale"] = self.scale
-        group.attrs["half_width"] = self.half_width
+        group.attrs["config"] = json.dumps(asdict(self.config))
         group.create_dataset("code", data=self.code, chunks=self.code.shape, fletcher32=True)
 
     @classmethod
@@ -146,7 +149,7 @@ class PointSDFPosterior:
             code,
             np.asarray(group.attrs["center"], dtype=np.float64),
             float(group.attrs["scale"]),
-            float(group.attrs["half_width"]),
+            changed(PointSDFConfig(), json.loads(group.attrs["config"]), group.name),
         )
 
 
@@ -238,7 +241,7 @@ def reconstruct_pointsdf(
     for item, code in zip(seen, codes, strict=True):
         assert item.center is not None
         item.posterior = PointSDFPosterior(
-            network.decoder, code, item.center, network.config.scale, config.half_width
+            network.decoder, code, item.center, network.config.scale, config
         )
         item.seconds = {"observation": observation, "inference": inference}
     return found

@@ -6,7 +6,7 @@ Scenes", 2024 (arXiv 2403.08106); the baseline of the paper's experiments.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass, field
 from functools import partial
 from time import perf_counter
 from typing import TYPE_CHECKING, ClassVar
@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from brrp_cli.config import VPrismConfig
+from brrp_cli.config import CoarseToFineConfig, VPrismConfig
 from brrp_cli.frames.frame import Frame
 from brrp_cli.methods.base import Setup
 from brrp_cli.methods.coarse_to_fine import coarse_to_fine_volume
@@ -57,6 +57,7 @@ class VPrismPosterior:
     scene: SoftmaxMap
     label: int
     bounds: NDArray[np.float64]
+    grid: CoarseToFineConfig = field(default_factory=CoarseToFineConfig)
 
     def probability(self, points: NDArray[np.floating]) -> NDArray[np.float32]:
         """Probability (n,) that points (n, 3), metres, camera frame, belong to this object."""
@@ -71,7 +72,7 @@ class VPrismPosterior:
     def probability_volume(self, axes: Axes) -> NDArray[np.float32]:
         """`probability` (nx, ny, nz) on a grid of camera-frame coordinates, metres; between
         nodes where nothing is likely."""
-        return coarse_to_fine_volume(self.probability, axes)
+        return coarse_to_fine_volume(self.probability, axes, self.grid)
 
     @property
     def surface_unit(self) -> str:
@@ -89,10 +90,11 @@ class VPrismPosterior:
 
     def write(self, group: h5py.Group, shared: SharedParts) -> None:
         """Attributes map (the name of the scene's map among what is shared), label (the object's
-        class) and bounds (2, 3)."""
+        class), bounds (2, 3) and grid (step, empty)."""
         group.attrs["map"] = shared.write("map", self.scene, write_map)
         group.attrs["label"] = self.label
         group.attrs["bounds"] = self.bounds
+        group.attrs["grid"] = astuple(self.grid)
 
     @classmethod
     def read(cls, group: h5py.Group, shared: SharedParts) -> VPrismPosterior:
@@ -101,7 +103,9 @@ class VPrismPosterior:
         label = int(group.attrs["label"])
         if not 0 < label < len(scene.mean):
             raise ValueError(f"class {label} of {len(scene.mean)}")
-        return VPrismPosterior(scene, label, np.asarray(group.attrs["bounds"], dtype=np.float64))
+        bounds = np.asarray(group.attrs["bounds"], dtype=np.float64)
+        step, empty = group.attrs["grid"]
+        return VPrismPosterior(scene, label, bounds, CoarseToFineConfig(int(step), float(empty)))
 
 
 def run(frame: Frame, setup: Setup) -> Reconstruction:
@@ -154,7 +158,10 @@ def reconstruct_scene(
                 center=scene.centers[object_id],
                 observed=points,
                 posterior=VPrismPosterior(
-                    fitted, label, _box(scene.centers[object_id], config.half_width)
+                    fitted,
+                    label,
+                    _box(scene.centers[object_id], config.half_width),
+                    config.grid,
                 ),
                 seconds=dict(seconds),
             )

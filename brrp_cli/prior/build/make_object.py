@@ -68,7 +68,7 @@ def _from_mesh(  # type: ignore[no-untyped-def]
     original.apply_translation(-offset)
     # trimesh: centres of flat parts
     with timed(seconds, "repair"), np.errstate(divide="ignore", invalid="ignore"):
-        repaired = repair(original)
+        repaired = repair(original, parameters.repair)
     mesh = repaired.mesh
     with timed(seconds, "poses"):
         poses = resting_poses(mesh, parameters.poses)

@@ -9,6 +9,7 @@ inside of a bowl that was modelled as a sheet stays free, and the sheet becomes 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -17,16 +18,10 @@ from brrp_cli.dependencies import import_library
 from brrp_cli.errors import MeshError
 from brrp_cli.prior.build.solids import is_flat, is_solid, unite_bodies
 from brrp_cli.prior.build.surface_distance import surface_distances
+from brrp_cli.prior.parameters import RepairConfig
 
 if TYPE_CHECKING:
     import trimesh
-
-# A hole whose rim is shorter across than this share of the mesh's diagonal is a flaw, not a shape.
-SMALL_HOLE = 0.1
-# The wrap's probe enters every opening wider than ALPHA; its surface lies OFFSET outside. Both are
-# shares of the diagonal, so that a sheet of 25 cm becomes a wall of 2.5 mm.
-ALPHA = 0.02
-OFFSET = 0.005
 
 
 @dataclass(frozen=True)
@@ -37,17 +32,22 @@ class Repaired:
     record: dict[str, Any]
 
 
-def repair(original: trimesh.Trimesh) -> Repaired:
+def repair(original: trimesh.Trimesh, config: RepairConfig | None = None) -> Repaired:
     """A closed, outward mesh and a record of plain JSON.
 
     record: `closed_before`; `steps`, in words; `original_to_repaired` and `repaired_to_original`,
     each with the `mean` and `max` distance in metres. Errors: MeshError when nothing closes it.
     """
+    config = config or RepairConfig()
     closed_before = is_solid(original)
     mesh = original.copy()
     steps: list[str] = []
     if not closed_before:
-        for remedy in (_tidy, _split_and_fill, _wrap):
+        for remedy in (
+            _tidy,
+            partial(_split_and_fill, config=config),
+            partial(_wrap, config=config),
+        ):
             mesh, done = remedy(mesh)
             steps += done
             if mesh.is_watertight and mesh.is_winding_consistent:
@@ -107,7 +107,9 @@ def _faces_that_count(faces: np.ndarray) -> np.ndarray:
     return bounding if bounding.sum() > once.sum() / 2 else once
 
 
-def _split_and_fill(mesh: trimesh.Trimesh) -> tuple[trimesh.Trimesh, list[str]]:
+def _split_and_fill(
+    mesh: trimesh.Trimesh, config: RepairConfig
+) -> tuple[trimesh.Trimesh, list[str]]:
     steps = []
     crowded = int((np.unique(mesh.edges_unique_inverse, return_counts=True)[1] > 2).sum())
     if crowded:
@@ -117,7 +119,7 @@ def _split_and_fill(mesh: trimesh.Trimesh) -> tuple[trimesh.Trimesh, list[str]]:
         return mesh, steps
     mesh = _meshlab(mesh, ("meshing_repair_non_manifold_vertices", {"vertdispratio": 0.0}))
     rims = boundary_rims(mesh)
-    limit = SMALL_HOLE * np.linalg.norm(mesh.extents)
+    limit = config.small_hole * np.linalg.norm(mesh.extents)
     small = [len(rim) for rim in rims if _width(rim) <= limit]
     wide = [len(rim) for rim in rims if _width(rim) > limit]
     # pymeshlab tells holes apart by their number of edges alone.
@@ -132,7 +134,7 @@ def _split_and_fill(mesh: trimesh.Trimesh) -> tuple[trimesh.Trimesh, list[str]]:
     return mesh, steps
 
 
-def _wrap(mesh: trimesh.Trimesh) -> tuple[trimesh.Trimesh, list[str]]:
+def _wrap(mesh: trimesh.Trimesh, config: RepairConfig) -> tuple[trimesh.Trimesh, list[str]]:
     pymeshlab = import_library("pymeshlab")
     widest = max((_width(rim) for rim in boundary_rims(mesh)), default=0.0)
     diagonal = float(np.linalg.norm(mesh.extents))
@@ -141,13 +143,13 @@ def _wrap(mesh: trimesh.Trimesh) -> tuple[trimesh.Trimesh, list[str]]:
         (
             "generate_alpha_wrap",
             {
-                "alpha": pymeshlab.PercentageValue(100 * ALPHA),
-                "offset": pymeshlab.PercentageValue(100 * OFFSET),
+                "alpha": pymeshlab.PercentageValue(100 * config.alpha),
+                "offset": pymeshlab.PercentageValue(100 * config.offset),
             },
         ),
     )
-    step = f"wrapped the surface at {OFFSET * diagonal * 1e3:.1f} mm"
-    if widest > SMALL_HOLE * diagonal:
+    step = f"wrapped the surface at {config.offset * diagonal * 1e3:.1f} mm"
+    if widest > config.small_hole * diagonal:
         step += f"; openings up to {widest * 1e3:.0f} mm across stay open, as thin walls"
     return wrapped, [step]
 

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from brrp_cli.dependencies import import_open3d
 from brrp_cli.prior.parameters import SampleMix
+from brrp_cli.raycast import raycasting_scene
 
 if TYPE_CHECKING:
     import trimesh
@@ -21,13 +22,8 @@ RAYS = 3
 
 def inside(mesh: trimesh.Trimesh, points: NDArray[np.floating]) -> NDArray[np.bool_]:
     """Which of `points` (n, 3) lie inside a closed mesh; both in one frame and unit."""
-    o3d = import_open3d()
-    scene = o3d.t.geometry.RaycastingScene(nthreads=1)
-    scene.add_triangles(
-        o3d.core.Tensor(np.asarray(mesh.vertices, dtype=np.float32)),
-        o3d.core.Tensor(np.asarray(mesh.faces, dtype=np.uint32)),
-    )
-    query = o3d.core.Tensor(np.ascontiguousarray(points, dtype=np.float32))
+    scene = raycasting_scene([mesh], threads=1)
+    query = import_open3d().core.Tensor(np.ascontiguousarray(points, dtype=np.float32))
     return np.asarray(scene.compute_occupancy(query, nthreads=1, nsamples=RAYS).numpy() > 0.5)
 
 

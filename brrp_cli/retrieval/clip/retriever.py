@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from brrp_cli.dependencies import import_library
 from brrp_cli.errors import RetrievalError
 from brrp_cli.frames.frame import Frame
-from brrp_cli.retrieval.base import softmax
 from brrp_cli.retrieval.clip.embeddings import KeepIn, TextEmbeddings, text_embeddings
 from brrp_cli.retrieval.clip.image import clip_pixels, object_crop, stretch
 from brrp_cli.retrieval.clip.model_files import find_clip_parts
@@ -63,7 +63,9 @@ class ClipRetriever:
                 fix="take both models from one repository: brrp fetch clip",
             )
         # In single precision, as they are stored: a copy of 50,000 in double would be 0.2 GB.
-        return softmax(LOGIT_SCALE * (vectors @ image.astype(np.float32)))[:-1]
+        cosine = vectors @ image.astype(np.float32)
+        share = import_library("scipy.special").softmax((LOGIT_SCALE * cosine).astype(np.float64))
+        return np.asarray(share[:-1])
 
 
 def embed_descriptions(

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from brrp_cli.dependencies import import_library
 from brrp_cli.errors import RetrievalError
+from brrp_cli.learned_models import read_tokenizer
 
 START_TEXT, START = "<|startoftext|>", 49406
 END_TEXT, END = "<|endoftext|>", 49407
@@ -45,16 +46,11 @@ class ClipTokenizer:
     """CLIP's lower-cased byte-level BPE, read from the hub's tokenizer.json."""
 
     def __init__(self, path: Path) -> None:
-        try:
-            self._tokenizer = import_library("tokenizers").Tokenizer.from_file(str(path))
-        except Exception as error:  # the library raises a bare Exception for what it cannot read
-            raise _not_clip(path, found=str(error)) from error
+        # Start, end, length and padding are set here and not left to what the file says.
+        self._tokenizer = read_tokenizer(path, partial(_not_clip, path))
         special = {text: self._tokenizer.token_to_id(text) for text in (START_TEXT, END_TEXT)}
         if special != {START_TEXT: START, END_TEXT: END}:
             raise _not_clip(path, found=special)
-        # Start, end, length and padding are set here and not left to what the file says.
-        self._tokenizer.no_truncation()
-        self._tokenizer.no_padding()
         tokens = self([GOLDEN_TEXT])[0].tolist()
         if tokens != GOLDEN:
             raise _not_clip(path, found=tokens)

@@ -7,15 +7,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from brrp_cli.dependencies import import_library
 from brrp_cli.errors import RetrievalError
+from brrp_cli.learned_models import TYPES, OnnxModel
 
-_TYPES = {
-    "tensor(int64)": np.int64,
-    "tensor(int32)": np.int32,
-    "tensor(float)": np.float32,
-    "tensor(float16)": np.float16,
-}
 # The published exports' names for the embedding; a model with one output may call it anything.
 _EMBEDDINGS = ("text_embeds", "image_embeds", "embedding")
 _BATCH = 32
@@ -30,29 +24,17 @@ class Tower:
 
     def __init__(self, path: Path, kind: str) -> None:
         self.path = path
-        runtime = import_library("onnxruntime")
-        options = runtime.SessionOptions()
-        options.log_severity_level = 4  # its chatter on stderr is not for users; errors are raised
-        try:
-            self._session = runtime.InferenceSession(
-                str(path), options, providers=["CPUExecutionProvider"]
-            )
-        except Exception as error:  # its errors have no common base but Exception
-            raise RetrievalError(
-                f"CLIP's {kind} model cannot be read",
-                where=path,
-                expected="an ONNX model",
-                found=str(error).splitlines()[0],
-                fix="download the file again and compare its size and sha256 with the hub's",
-            ) from error
+        self._model = OnnxModel(
+            path, f"CLIP's {kind} model", RetrievalError, "fetch both models again: brrp fetch clip"
+        )
         self._check_input(kind)
         self._output = self._choose_output()
 
     def _check_input(self, kind: str) -> None:
-        inputs = self._session.get_inputs()
+        inputs = list(self._model.inputs.values())
         rank, letters = {"text": (2, "int"), "vision": (4, "float")}[kind]
         first = inputs[0]
-        known = first.type in _TYPES and first.type.startswith(f"tensor({letters}")
+        known = first.type in TYPES and first.type.startswith(f"tensor({letters}")
         square = kind == "text" or all(
             not isinstance(have, int) or have == want
             for have, want in zip(first.shape[1:], (3, 224, 224), strict=False)
@@ -66,12 +48,12 @@ class Tower:
                 found=", ".join(f"{i.name} {i.type} {i.shape}" for i in inputs),
                 fix="download both models from one of the two published repositories",
             )
-        self._name, self._type = first.name, _TYPES[first.type]
+        self._name, self._type = first.name, TYPES[first.type]
         sizes = [size if isinstance(size, int) and size > 0 else None for size in first.shape]
         self.batch, self.length = sizes[0], sizes[1]
 
     def _choose_output(self) -> str:
-        names = [output.name for output in self._session.get_outputs()]
+        names = self._model.outputs
         chosen = next((name for name in _EMBEDDINGS if name in names), None)
         if chosen is None and len(names) == 1:
             chosen = names[0]
@@ -108,16 +90,7 @@ class Tower:
     def _run(self, rows: NDArray[np.generic]) -> NDArray[np.floating]:
         short = (self.batch or len(rows)) - len(rows)
         full = np.concatenate([rows, np.repeat(rows[-1:], short, axis=0)]) if short else rows
-        try:
-            (out,) = self._session.run([self._output], {self._name: full.astype(self._type)})
-        except Exception as error:
-            raise RetrievalError(
-                "The model fails when it is run",
-                where=self.path,
-                found=str(error).splitlines()[0],
-                fix="use one of the two published repositories that docs/retrieval.md names",
-            ) from error
-        out = np.asarray(out)
+        (out,) = self._model.run([self._output], {self._name: full.astype(self._type)})
         if out.ndim != 2 or len(out) != len(full):
             raise RetrievalError(
                 "The model's output is not one embedding for each input",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,7 @@ from numpy.typing import NDArray
 
 from brrp_cli.dependencies import import_library
 from brrp_cli.errors import MaskError
+from brrp_cli.learned_models import read_tokenizer
 from brrp_cli.segmentation.prompted.onnx_session import Session
 
 SIDE = 800  # the export's preprocessor stretches every image to that square
@@ -73,7 +75,7 @@ class Detector:
             )
         # Tokens beyond the phrase are -inf, which is a score of 0.
         best = np.nan_to_num(logits[0].astype(np.float64), nan=-np.inf).max(axis=1)
-        scores = 1.0 / (1.0 + np.exp(-np.clip(best, -60, 60)))
+        scores = import_library("scipy.special").expit(best)
         height, width = rgb.shape[:2]
         middle, size = boxes[0, :, :2].astype(np.float64), boxes[0, :, 2:].astype(np.float64)
         corners = np.concatenate([middle - size / 2, middle + size / 2], axis=1)
@@ -96,17 +98,11 @@ class _Tokenizer:
     """BERT's lower-cased word pieces, from the hub's tokenizer.json."""
 
     def __init__(self, path: Path) -> None:
-        try:
-            self._tokenizer = import_library("tokenizers").Tokenizer.from_file(str(path))
-        except Exception as error:  # the library raises a bare Exception for what it cannot read
-            raise self._wrong(path, str(error)) from error
+        self._tokenizer = read_tokenizer(path, partial(self._wrong, path))
         ends = [self._tokenizer.token_to_id(token) for token in (_START, _END, _DOT)]
         if None in ends:
             raise self._wrong(path, dict(zip((_START, _END, _DOT), ends, strict=True)))
         self._start, self._end, self._dot = ends
-        # What the file says of length and padding must not matter.
-        self._tokenizer.no_truncation()
-        self._tokenizer.no_padding()
 
     def __call__(self, text: str) -> list[int]:
         """Start, the words, a full stop, end."""

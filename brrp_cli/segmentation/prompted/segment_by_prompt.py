@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import logging
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from brrp_cli.config.segmentation import PromptConfig, SegmentConfig
 from brrp_cli.dependencies import import_library
 from brrp_cli.errors import FrameError
 from brrp_cli.frames.frame import BACKGROUND, Frame
@@ -21,26 +21,6 @@ from brrp_cli.segmentation.table_plane import find_table
 log = logging.getLogger(__name__)
 
 
-@dataclass(frozen=True)
-class PromptConfig:
-    """threshold : least score of a box (the detector's published default)
-    overlap : boxes that share more of their union are one
-    same : of two masks of which the smaller lies in the larger by that part, and which are of about
-        one size, one is dropped
-    largest : boxes that cover more of the image are the scene, not an object
-    table : masks of which that part lies on the table, `height` metres, are the table
-    min_pixels : with depth
-    """
-
-    threshold: float = 0.3
-    overlap: float = 0.7
-    same: float = 0.8
-    largest: float = 0.5
-    table: float = 0.7
-    height: float = 0.006
-    min_pixels: int = 50
-
-
 class PromptSegmenter:
     """Detector and segmenter, loaded once for any number of frames.
 
@@ -49,8 +29,8 @@ class PromptSegmenter:
     Errors: MaskError if they are missing or not the right ones.
     """
 
-    def __init__(self, folder: Path | None = None, config: PromptConfig | None = None) -> None:
-        self._config = config or PromptConfig()
+    def __init__(self, folder: Path | None = None, config: SegmentConfig | None = None) -> None:
+        self._config = config or SegmentConfig()
         files = find_mask_files(folder)
         self._detector = Detector(files.detector, files.tokenizer)
         self._segmenter = Segmenter(files.encoder, files.decoder)
@@ -61,9 +41,9 @@ class PromptSegmenter:
         Where masks overlap the smaller one is in front: a pen lies in the cup, not the cup around
         the pen. Errors: MaskError for an empty prompt; FrameError if nothing is found.
         """
-        named = phrases(prompt)
-        found = [self._detector(frame.rgb, name, self._config.threshold) for name in named]
-        boxes = _apart(_small(found, frame.shape, self._config), self._config.overlap)
+        named, config = phrases(prompt), self._config.prompt
+        found = [self._detector(frame.rgb, name, config.threshold) for name in named]
+        boxes = _apart(_small(found, frame.shape, config), config.overlap)
         log.info("Detected: %d boxes for %s", len(boxes), ", ".join(map(repr, named)))
         masks = list(self._segmenter(frame.rgb, boxes)[0]) if len(boxes) else []
         return layered(masks, frame, seed, self._config)
@@ -94,7 +74,7 @@ def _iou(first: NDArray[np.float64], second: NDArray[np.float64]) -> float:
 
 
 def layered(
-    masks: list[NDArray[np.bool_]], frame: Frame, seed: int, config: PromptConfig
+    masks: list[NDArray[np.bool_]], frame: Frame, seed: int, whole: SegmentConfig
 ) -> NDArray[np.int64]:
     """One map (H, W) of masks that may overlap, each filtered by depth.
 
@@ -103,11 +83,13 @@ def layered(
 
     Errors: FrameError if none is left.
     """
-    on_table = _table(frame, seed, config.height)
-    flying = flying_pixels(np.where(frame.valid, frame.points[..., 2], np.nan))
+    config = whole.prompt
+    on_table = _table(frame, seed, whole)
+    raw = np.where(frame.valid, frame.points[..., 2], np.nan)
+    flying = flying_pixels(raw, whole.smooth_depth)
     kept: list[NDArray[np.bool_]] = []
     for mask in sorted(masks, key=lambda one: -int(one.sum())):
-        cleaned = _largest_piece(mask & ~flying)
+        cleaned = _largest_piece(mask & ~flying, config.piece)
         seen = int((cleaned & frame.valid).sum())
         if seen < config.min_pixels:
             continue
@@ -136,7 +118,7 @@ def _same(smaller: NDArray[np.bool_], larger: NDArray[np.bool_], part: float) ->
     return int((smaller & larger).sum()) > part * int(larger.sum())
 
 
-def _largest_piece(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
+def _largest_piece(mask: NDArray[np.bool_], least: float) -> NDArray[np.bool_]:
     ndimage = import_library("scipy.ndimage")
     pieces, count = ndimage.label(mask, structure=np.ones((3, 3)))
     if count < 2:
@@ -144,15 +126,15 @@ def _largest_piece(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
     sizes = np.bincount(pieces.ravel())
     sizes[BACKGROUND] = 0
     # Something in front may have cut it: pieces of some size stay.
-    return np.asarray(mask & (sizes[pieces] >= 0.2 * sizes.max()))
+    return np.asarray(mask & (sizes[pieces] >= least * sizes.max()))
 
 
-def _table(frame: Frame, seed: int, height: float) -> NDArray[np.bool_]:
+def _table(frame: Frame, seed: int, config: SegmentConfig) -> NDArray[np.bool_]:
     """(H, W) pixels on the table; none where there is no table."""
     try:
-        table = find_table(frame.points[frame.valid], seed, frame.source)
+        table = find_table(frame.points[frame.valid], seed, frame.source, config.table)
     except FrameError as error:
         log.info("No table was found, so that no mask is held against it: %s", error.what)
         return np.zeros(frame.shape, dtype=bool)
     with np.errstate(invalid="ignore"):
-        return np.abs(table.plane.signed_distance(frame.points)) < height
+        return np.abs(table.plane.signed_distance(frame.points)) < config.prompt.height

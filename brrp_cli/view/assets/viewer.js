@@ -68,10 +68,10 @@
       "P": "P(c|R): how probable retrieval holds it, before anything was placed",
       "alignment_score": "what the frame says for its best placement, 1 at best",
       "weight": "of it in the posterior",
-      "scale": "of its best placement",
+      "size": "factor of its stored size, at its best placement",
     };
     for (const [name, title] of Object.entries(titles)) element("th", head, name).title = title;
-    const rows = about.retrieved.map((r) => [r.name, r.probability, r.alignment_score, r.weight, r.scale]);
+    const rows = about.retrieved.map((r) => [r.name, r.probability, r.alignment_score, r.weight, r.size_factor]);
     rows.push([NONE, about.not_in_prior, null, about.weight_not_in_prior, null]);
     const weights = rows.map((row) => (row[3] === null ? row[1] : row[3]));
     const most = weights.indexOf(Math.max(...weights));

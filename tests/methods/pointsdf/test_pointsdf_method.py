@@ -9,7 +9,6 @@ from brrp_cli.config import PointSDFConfig
 from brrp_cli.frames.frame import Frame
 from brrp_cli.ground_truth.truth import true_mesh_in_camera
 from brrp_cli.methods.pointsdf.method import (
-    LARGEST,
     LOGISTIC,
     PointSDFPosterior,
     reconstruct_pointsdf,
@@ -39,7 +38,7 @@ class Ball(torch.nn.Module):
 
 @pytest.fixture
 def ball():
-    return PointSDFPosterior(Ball(), np.zeros(4, np.float32), CENTER, 0.15, 0.2)
+    return PointSDFPosterior(Ball(), np.zeros(4, np.float32), CENTER, 0.15, PointSDFConfig())
 
 
 def on_ball(radius, n=500):
@@ -53,7 +52,7 @@ def test_queries_are_centred_and_scaled(ball):
 
 
 def test_nothing_is_occupied_outside_of_the_box(ball):
-    everything = replace(ball, half_width=0.03)
+    everything = replace(ball, config=PointSDFConfig(half_width=0.03))
     corner = CENTER + [0.029, 0.029, 0.029]
     assert everything.probability(np.array([corner]))[0] > 0.9
     assert everything.probability(np.array([corner + [0.002, 0, 0]]))[0] == 0
@@ -93,7 +92,7 @@ def test_uncertainty_of_the_surface_is_its_spread(ball):
     np.testing.assert_allclose(found, LOGISTIC * WIDTH, rtol=0.02)
     assert pytest.approx(0.0073, abs=1e-4) == LOGISTIC * WIDTH
     flat = replace(ball, scale=1e6)
-    np.testing.assert_allclose(flat.surface_uncertainty(on_ball(RADIUS)), LARGEST)
+    np.testing.assert_allclose(flat.surface_uncertainty(on_ball(RADIUS)), 0.05)
     np.testing.assert_allclose(ball.uncertainty(on_ball(RADIUS)), 0.25, atol=1e-3)
 
 

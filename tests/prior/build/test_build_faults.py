@@ -34,7 +34,8 @@ from small_prior import prior_bytes
 
 from brrp_cli.config import FeatureConfig
 from brrp_cli.errors import BrrpError, OutputError
-from brrp_cli.prior.build.build import build, build_prior, make_stored
+from brrp_cli.prior.build import build
+from brrp_cli.prior.build.build import build_prior, make_stored
 from brrp_cli.prior.build.shard_plan import plan_shards
 from brrp_cli.prior.manifest import FILE
 from brrp_cli.prior.parameters import AppearanceConfig, BuildParameters, FieldConfig

@@ -18,7 +18,8 @@ from small_prior import prior_bytes
 
 import brrp_cli
 from brrp_cli.errors import PriorError
-from brrp_cli.prior.build.build import build, build_prior
+from brrp_cli.prior.build import build
+from brrp_cli.prior.build.build import build_prior
 from brrp_cli.prior.build.shard_plan import plan_shards
 from brrp_cli.prior.shard import object_names, open_shard
 from brrp_cli.prior.store import open_prior, verify_prior

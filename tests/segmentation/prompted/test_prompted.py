@@ -12,12 +12,13 @@ from small_grounded_sam import RGB, write_detector, write_manifest, write_models
 from table_scene import T_CAM_WORLD, in_camera, photograph
 
 from brrp_cli.cli import main
+from brrp_cli.config.segmentation import SegmentConfig
 from brrp_cli.errors import FrameError, MaskError
 from brrp_cli.frames.frame import Frame
 from brrp_cli.frames.npz import load_frame, save_frame
 from brrp_cli.segmentation.prompted.detector import Detector, phrases
 from brrp_cli.segmentation.prompted.mask_files import find_mask_files
-from brrp_cli.segmentation.prompted.segment_by_prompt import PromptConfig, PromptSegmenter, layered
+from brrp_cli.segmentation.prompted.segment_by_prompt import PromptSegmenter, layered
 from brrp_cli.shapes import solids
 
 
@@ -75,7 +76,7 @@ def test_boxes_are_in_the_pixels_of_the_image(models: Path, coloured: Frame) -> 
 
 
 def test_masks_are_filtered_by_depth(coloured: Frame) -> None:
-    config, seed = PromptConfig(), 0
+    config, seed = SegmentConfig(), 0
     table = (coloured.segmap == 0) & coloured.valid
     table[:, 160:] = False
     with pytest.raises(FrameError, match="after the depth filters"):
@@ -91,7 +92,7 @@ def test_masks_are_filtered_by_depth(coloured: Frame) -> None:
 
 def test_a_smaller_mask_lies_in_front(coloured: Frame) -> None:
     whole = np.isin(coloured.segmap, (1, 2))
-    layers = layered([coloured.segmap == 2, whole], coloured, 0, PromptConfig())
+    layers = layered([coloured.segmap == 2, whole], coloured, 0, SegmentConfig())
     inner = layers[coloured.segmap == 2]
     assert len(np.unique(inner[inner > 0])) == 1
     assert set(np.unique(layers[coloured.segmap == 1])) - {0} == {1, 2} - set(np.unique(inner))

@@ -10,6 +10,8 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
+from brrp_cli.config.ranges import share
+from brrp_cli.config.retrieval import RetrievalConfig
 from brrp_cli.errors import BrrpError
 
 
@@ -36,14 +38,24 @@ class RegistrationConfig:
 
     draw: int = 3
     correspondence_distance: float = 0.0075
-    edge_length: float = 0.9
+    edge_length: float = share(0.9)
     iterations: int = 100_000
-    confidence: float = 0.99
+    confidence: float = share(0.99)
 
 
 @dataclass(frozen=True)
 class ObservationConfig:
-    """Observed samples: surface, stratified rays, below the plane (paper, section IV-C)."""
+    """Observed samples: surface, stratified rays, below the plane (paper, section IV-C).
+
+    min_points : valid depth points that an object needs
+    ray_bin : metres of a stratum along a ray, which holds one sample; ray_radius : of the ball
+        around the object's middle in which rays are sampled; max_ray_samples : of them, at most
+    plane_radius : metres around the scene's middle in which the support plane is looked for;
+        plane_tolerance : of its inliers; plane_iterations : of RANSAC, on plane_ransac_points
+        drawn points at most; plane_min_points : that a plane needs
+    below_draws : samples below the plane within `below_radius`, metres, of the object's middle
+    free_cell, surface_cell : metres, of grids in which samples of one label are thinned
+    """
 
     min_points: int = 16
     ray_bin: float = 0.2
@@ -52,6 +64,8 @@ class ObservationConfig:
     plane_radius: float = 0.6
     plane_tolerance: float = 0.01
     plane_iterations: int = 1000
+    plane_ransac_points: int = 4_000
+    plane_min_points: int = 100
     below_draws: int = 50_000
     below_radius: float = 0.2
     free_cell: float = 0.015
@@ -62,12 +76,26 @@ class ObservationConfig:
 class SensorConfig:
     """How far measured depth errs: a standard deviation of noise + noise_growth * depth^2, metres.
 
+    wave : metres, least standard deviation of the mean depth of a patch `patch` metres wide; more
+    is measured on the support plane, within `table_reach` metres of it, where `least_patches`
+    patches have `patch_points` pixels
+    bias : metres, standard deviation of what depth is off as a whole
+    pose_turn, pose_shift : radians and metres by which a placement may be off before anything is
+    seen
     sure : standard deviations in front of the measured depth from which on space is free for
     certain
     """
 
     noise: float = 0.0012
     noise_growth: float = 0.0015
+    wave: float = 0.0005
+    bias: float = 0.00035
+    patch: float = 0.01
+    table_reach: float = 0.015
+    least_patches: int = 30
+    patch_points: int = 8
+    pose_turn: float = 0.05
+    pose_shift: float = 0.005
     sure: float = 3.0
 
 
@@ -98,6 +126,7 @@ class SurfaceConfig:
     moved further, and where no stored object explains what is seen, the surface comes from marching
     cubes on a grid of about `nodes` nodes, whose spacing in metres lies between `finest` and
     `spacing`.
+    fidelity : metres, standard deviation of a stored mesh from its object
     keep_distance : metres; a component of the level set further from every observed point is
     hallucinated
     seen_share : of the observed points that a part near them must own to be joined to the largest,
@@ -105,18 +134,19 @@ class SurfaceConfig:
     metres, of what joins them, which is two nodes thick at least
     """
 
-    level: float = 0.5
+    level: float = share(0.5)
     spacing: float = 0.005
     finest: float = 0.002
     nodes: int = 300_000
     keep_distance: float = 0.01
-    seen_share: float = 0.03
-    volume_share: float = 0.1
+    seen_share: float = share(0.03)
+    volume_share: float = share(0.1)
     route_radius: float = 0.003
     farthest: float = 0.004
-    wall_share: float = 0.4
+    wall_share: float = share(0.4)
     steps: int = 17
-    most_off: float = 0.05
+    fidelity: float = 0.0002
+    most_off: float = share(0.05)
 
 
 @dataclass(frozen=True)
@@ -156,6 +186,13 @@ class SearchConfig:
     """
 
     turns: int = 24
+    model_points: int = 300
+    least_facing: int = 6
+    stray: float = share(0.02)
+    box_points: int = 600
+    hidden: float = 0.015
+    first_share: int = 3
+    first_factor: int = 2
     matchings: int = 4
     matching: RegistrationConfig = field(
         default_factory=lambda: RegistrationConfig(iterations=5_000)
@@ -198,9 +235,9 @@ class WeighConfig:
 
     sharpness: float = 40.0
     unknown_score: float = 0.7
-    least_unknown: float = 0.1
-    most_unknown: float = 0.9
-    least_share: float = 1e-3
+    least_unknown: float = share(0.1)
+    most_unknown: float = share(0.9)
+    least_share: float = share(1e-3)
 
 
 @dataclass(frozen=True)
@@ -211,14 +248,14 @@ class MeanConfig:
     `sure` widens it by `doubt` metres for each unit. An object that none explains is completed on a
     grid of about `nodes` nodes by a network, which is evaluated at every node where the coarse ones
     around are not all `beyond_doubt`; its logit is `shell_logit` at least for `shell` metres behind
-    what is seen of it, and for `shell_nodes` of the grid's spacings where these are longer. Space
-    is empty that lies more than `carve_depth` in front of the measured depth, or `carve_plane`
-    below the plane, or less than `carve_behind` behind what is no object's
-    and more than `carve_pixels` from the mask.
+    what is seen of it, or `shell_nodes` of the grid's spacings where these are longer, and
+    `shell_before` metres in front. Space is empty that lies more than `carve_depth` in front of the
+    measured depth, or `carve_plane` below the plane, or less than `carve_behind` behind what is no
+    object's and more than `carve_pixels` from the mask.
     """
 
     nodes: int = 200_000
-    width: float = 0.001
+    width: float = 0.0005
     sure: float = 0.9
     doubt: float = 0.01
     limit: float = 5.0
@@ -226,6 +263,7 @@ class MeanConfig:
     shell: float = 0.004
     shell_nodes: float = 1.3
     shell_logit: float = 2.0
+    shell_before: float = 0.001
     carve_depth: float = 0.006
     carve_plane: float = 0.004
     carve_behind: float = 0.01
@@ -238,10 +276,27 @@ class CompletionConfig:
 
     cell : metres, of grids in which observed points are merged; closing : gaps of fewer cells are
     closed
+
+    The rest belongs to the network's weights: it was trained with these numbers.
+    least : metres; smaller extents are as noisy as depth is; most : shares of the seen points
+        between which an object's size is taken: strays do not count
+    neighbours : seen points whose spread gives a normal
+    thickness : metres, standard deviation by which points in one plane, which have no hull, move
+    radii : of discs by which local thickness is measured
+    far, ratio : lengths, metres, and ratios beyond these tell nothing more; thin : metres, added
+        to what a length is divided by that may be 0
     """
 
     cell: float = 0.004
     closing: int = 7
+    least: float = 0.005
+    most: tuple[float, float] = (0.02, 0.98)
+    neighbours: int = 12
+    thickness: float = 0.0005
+    radii: int = 12
+    far: float = 0.2
+    ratio: float = 4.0
+    thin: float = 0.002
 
 
 @dataclass(frozen=True)
@@ -252,7 +307,9 @@ class FittedMapConfig:
     behind : metres behind and in front of the seen surface where it is sampled
     start : standard deviation of the particles' first weights
     stiffness : lambda_norm is so many times as large for a placed shape, which is known better than
-    a completed one; least_weight : hypotheses that weigh less are left out
+    a completed one; contradiction : a sample that a placed shape cannot explain by the noise counts
+    so many times, for there are few of them among all that was seen to be free around it;
+    least_weight : hypotheses that weigh less are left out
     """
 
     hinges: int = 1000
@@ -268,7 +325,8 @@ class FittedMapConfig:
     lambda_observed: float = 50.0
     lambda_norm: float = 0.5
     stiffness: float = 8.0
-    least_weight: float = 0.01
+    contradiction: float = 1000.0
+    least_weight: float = share(0.01)
 
 
 @dataclass(frozen=True)
@@ -297,6 +355,7 @@ class Config:
     registration: RegistrationConfig = field(default_factory=RegistrationConfig)
     observation: ObservationConfig = field(default_factory=ObservationConfig)
     inference: InferenceConfig = field(default_factory=InferenceConfig)
+    retrieval: RetrievalConfig = field(default_factory=RetrievalConfig)
     surface: SurfaceConfig = field(default_factory=SurfaceConfig)
     hypotheses: HypothesesConfig | None = field(default_factory=HypothesesConfig)
 
@@ -325,17 +384,31 @@ def _vprism_observation() -> ObservationConfig:
 
 
 @dataclass(frozen=True)
+class CoarseToFineConfig:
+    """A grid is evaluated at every `step`-th node first, and at all nodes only where one of the
+    corners around is likelier than `empty` to be occupied."""
+
+    step: int = 3
+    empty: float = share(0.02)
+
+
+@dataclass(frozen=True)
 class PointSDFConfig:
     """The PointSDF baseline: what is asked of a trained network.
 
     surface : its level is the paper's; observation : only what finds the support plane
     half_width : of the box around the middle of what was seen outside of which occupancy is 0
+    largest_deviation : metres; no surface is less certain than this; difference_step : metres, of
+    difference quotients across the surface
     """
 
     surface: SurfaceConfig = SurfaceConfig(level=0.3)
     observation: ObservationConfig = field(default_factory=ObservationConfig)
     min_points: int = 16
     half_width: float = 0.2
+    grid: CoarseToFineConfig = field(default_factory=CoarseToFineConfig)
+    largest_deviation: float = 0.05
+    difference_step: float = 0.001
 
 
 @dataclass(frozen=True)
@@ -358,3 +431,4 @@ class VPrismConfig:
     iterations: int = 3
     max_update_points: int = 20_000
     half_width: float = 0.2
+    grid: CoarseToFineConfig = field(default_factory=CoarseToFineConfig)

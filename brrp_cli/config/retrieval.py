@@ -1,0 +1,117 @@
+"""Numbers of retrieval by appearance (brrp_cli/retrieval). Lengths are metres."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from brrp_cli.config.ranges import between, share
+
+
+@dataclass(frozen=True)
+class ObservedAppearanceConfig:
+    """What a frame shows of one object.
+
+    above_plane : what lies lower above the plane may be the plane's: masks from depth take some of
+        it along; left : part of a mask's points that has to be left when those are taken away
+    inner : part of a mask's pixels that has to be left without the outermost, whose colours are
+        mixed
+    height_quantile, width_share : of the points, of which stray ones do not count for the size
+    normal_radius, normal_neighbours : of the points that a normal is fitted to
+    in_front : what stands in front of an outline by more hides something; reach : pixels within
+        which an outline is compared with others
+    """
+
+    above_plane: float = 0.004
+    left: float = share(0.5)
+    inner: float = share(0.4)
+    height_quantile: float = share(0.995)
+    width_share: float = share(0.986)
+    normal_radius: float = 0.015
+    normal_neighbours: int = 30
+    in_front: float = 0.01
+    reach: int = 2
+
+
+@dataclass(frozen=True)
+class IlluminantsConfig:
+    """Lights that an image may have been taken in, as gains of its red, green and blue.
+
+    darkest, brightest : gains, between which `brightness` of them are tried, evenly in logarithms
+    warmth : red over blue; tint : green over the middle of red and blue
+    brightness_spread, warmth_spread : how far they lie from 1 before they are seen, standard
+        deviations of logarithms
+    local_brightness_spread, local_warmth_spread : how much the light on one object differs from
+        that on the scene: what faces the lamp, stands in a shadow or reflects a neighbour
+    """
+
+    darkest: float = 0.5
+    brightest: float = 2.2
+    brightness: int = 9
+    warmth: tuple[float, ...] = (0.8, 0.9, 1.0, 1.11, 1.25)
+    tint: tuple[float, ...] = (0.95, 1.0, 1.06)
+    brightness_spread: float = 0.5
+    warmth_spread: float = 0.3
+    local_brightness_spread: float = 0.2
+    local_warmth_spread: float = 0.08
+
+
+@dataclass(frozen=True)
+class SimilarityConfig:
+    """How alike a seen object is to stored ones.
+
+    neutral_colour, neutral_pairs : likeness where it cannot be judged, as with a mesh without
+        colours: about what an object that is rightly found has
+    size_spread : height and both sides of the footprint differ by so much without meaning
+        anything; size_share : and by that part of the stored one
+    smaller : weight of being smaller than the stored object, against being larger: a footprint is
+        seen from one side; size_limit : squared spreads beyond which nothing more speaks against it
+    """
+
+    neutral_colour: float = share(0.93)
+    neutral_pairs: float = share(0.97)
+    size_spread: tuple[float, float, float] = (0.006, 0.008, 0.008)
+    size_share: float = 0.06
+    smaller: tuple[float, float, float] = (1.0, 0.15, 0.15)
+    size_limit: float = 16.0
+
+
+@dataclass(frozen=True)
+class FusionConfig:
+    r"""Inverse temperatures of the likenesses and the offset of the log odds: see
+    brrp_cli/retrieval/score_fusion.py.
+
+    Fitted by tools/fit_appearance.py on made scenes of 50 YCB objects of the prior (30), of 7
+    others (10) and of random shapes (10), seed 3000:
+      python tools/make_scenes.py --meshes MESHES --noise structured-light --light varied \
+        --seed 3000
+      python tools/fit_appearance.py --prior prior/ fit_prior/ fit_unseen/ fit_other/
+    """
+
+    colour: float = 24.26
+    pairs: float = 25.27
+    size: float = 0.44
+    offset: float = between(9.88, -100.0, 100.0)
+
+
+@dataclass(frozen=True)
+class ShortlistConfig:
+    """Which objects of a large prior are looked at closely.
+
+    closely : so many, and all of a prior of that size or less; roughly : so many are kept by colour
+    and shape, of which `closely` are kept by size too; light_step : of every so many-th light
+    """
+
+    closely: int = 256
+    roughly: int = 2_000
+    light_step: int = 8
+
+
+@dataclass(frozen=True)
+class RetrievalConfig:
+    """P(c|R) by appearance."""
+
+    observed: ObservedAppearanceConfig = field(default_factory=ObservedAppearanceConfig)
+    illuminants: IlluminantsConfig = field(default_factory=IlluminantsConfig)
+    similarity: SimilarityConfig = field(default_factory=SimilarityConfig)
+    fusion: FusionConfig = field(default_factory=FusionConfig)
+    shortlist: ShortlistConfig = field(default_factory=ShortlistConfig)

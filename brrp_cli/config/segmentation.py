@@ -1,0 +1,205 @@
+"""Numbers of masks that are made without a model (brrp_cli/segmentation). Lengths are metres."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from brrp_cli.config.ranges import between, share
+
+
+@dataclass(frozen=True)
+class SmoothDepthConfig:
+    """Depth averaged over one surface, and flying pixels.
+
+    noise : deviation of inverse depth, 1 / metres: 3 mm at 1 m, the step and the deviation of the
+        first Kinect and of stereo cameras at that range; floor : metres that no camera's depth is
+        better than, however near
+    radius : pixels to each side of the window that is averaged; rounds : times it is averaged
+    flying_noise : a neighbour is at a pixel's depth within so many deviations; flying_share : a
+        pixel with less than that part of its neighbours at its depth flies, and one with fewer
+        than flying_least
+    """
+
+    noise: float = 0.003
+    floor: float = 0.0015
+    radius: int = 3
+    rounds: int = 2
+    flying_noise: float = 5.0
+    flying_share: float = share(0.375)
+    flying_least: int = 6
+
+
+@dataclass(frozen=True)
+class TableConfig:
+    """The table's plane and its extent.
+
+    points : so many are drawn, and of those ransac_points for RANSAC; iterations : of it;
+    tolerance : metres of its inliers; min_points : of them, at least
+    candidates : planes that are looked for; least : part of the points that a plane holds
+    parallel : degrees between the table and a floor; height : metres of the table above a floor;
+    of_floor : points of the table, as a part of the floor's
+    cell : metres of the grid on which the plane's points hang together
+    """
+
+    points: int = 40_000
+    ransac_points: int = 4_000
+    min_points: int = 100
+    iterations: int = 1000
+    tolerance: float = 0.01
+    candidates: int = 3
+    least: float = share(0.05)
+    parallel: float = between(10.0, 0.0, 90.0)
+    height: float = 0.2
+    of_floor: float = share(0.25)
+    cell: float = 0.02
+
+
+@dataclass(frozen=True)
+class ConcaveEdgesConfig:
+    """Jumps of depth and hollow creases.
+
+    reach : pixels to each side across which a crease is looked for; normal_step : pixels of the
+        difference quotients of normals
+    flat, sharp : degrees between both sides' normals: no crease, and surely one
+    near : metres; sides farther apart are two surfaces, whatever their normals
+    steep : slope beyond which depth jumps; jump : metres that it jumps at least
+    """
+
+    reach: int = between(4, 4, 64)
+    normal_step: int = 2
+    flat: float = between(30.0, 0.0, 180.0)
+    sharp: float = between(60.0, 0.0, 180.0)
+    near: float = 0.05
+    steep: float = 6.0
+    jump: float = 0.008
+
+
+@dataclass(frozen=True)
+class ComponentsConfig:
+    """Parts that boundaries enclose.
+
+    calm : of boundary, at most, in the middle of a part; least_core : pixels of that middle
+    least_border : pixels of a common border; meet : part of a border that is a crease, from which
+    on two parts meet in one; neck : width of a border that joins nothing, as a part of the smaller
+    part's width
+    """
+
+    calm: float = share(0.3)
+    least_core: int = 30
+    least_border: int = 4
+    meet: float = share(0.45)
+    neck: float = share(0.35)
+
+
+@dataclass(frozen=True)
+class FootprintsConfig:
+    """Parts that stand on one spot of the table.
+
+    cell : metres of the plan's grid
+    inward, facing : mean cosine to the middle: of an inside that shares the footprint, and of
+        walls of which one is seen from within and one from without (of a round one 0.9)
+    round : part of both footprints that the hull around them may hold besides
+    above : metres by which an inside may rise over its outside
+    same_range : part of the lower one's heights that pieces at one height share
+    stands : metres; what is nowhere lower does not stand on the table
+    over, pieces, coloured : parts of the smaller footprint that are shared by what hangs on
+        something and that, by pieces of one thing, by pieces of one vivid colour
+    """
+
+    cell: float = 0.003
+    inward: float = between(0.3, -1.0, 1.0)
+    facing: float = between(0.7, -1.0, 1.0)
+    round: float = 0.35
+    above: float = 0.02
+    same_range: float = share(0.3)
+    stands: float = 0.04
+    over: float = share(0.4)
+    pieces: float = share(0.25)
+    coloured: float = share(0.15)
+
+
+@dataclass(frozen=True)
+class VividColourConfig:
+    """Parts of one vivid colour.
+
+    saturation, value : of a pixel, 0 to 1. Below them hue is noise
+    vivid : share of a part's pixels that are vivid; cameras smear grey of the table over edges
+    spread : degrees of hue, median deviation within a part: more is a printed thing
+    same : degrees of hue between two parts; light from two sides shifts it so much
+    """
+
+    saturation: float = share(0.4)
+    value: float = share(0.3)
+    vivid: float = share(0.35)
+    spread: float = between(10.0, 0.0, 180.0)
+    same: float = between(15.0, 0.0, 180.0)
+
+
+@dataclass(frozen=True)
+class ConcavitiesConfig:
+    """What an object's walls stand around.
+
+    cell : metres of the plan's grid; sectors : directions that are looked into; around : those of
+    them that hold the object; wall : metres that an inside keeps from the hull of the walls
+    """
+
+    cell: float = 0.004
+    sectors: int = 12
+    around: int = 8
+    wall: float = 0.008
+
+
+@dataclass(frozen=True)
+class PromptConfig:
+    """Masks of what a prompt names.
+
+    threshold : least score of a box (the detector's published default)
+    overlap : boxes that share more of their union are one
+    same : of two masks of which the smaller lies in the larger by that part, and which are of about
+        one size, one is dropped
+    largest : boxes that cover more of the image are the scene, not an object
+    table : masks of which that part lies on the table, `height` metres, are the table
+    min_pixels : with depth
+    piece : a piece of a mask that is no smaller than that part of its largest one stays
+    """
+
+    threshold: float = share(0.3)
+    overlap: float = share(0.7)
+    same: float = share(0.8)
+    largest: float = share(0.5)
+    table: float = share(0.7)
+    height: float = 0.006
+    min_pixels: int = 50
+    piece: float = share(0.2)
+
+
+@dataclass(frozen=True)
+class SegmentConfig:
+    """Masks without a model, and in `prompt` those by a prompt, which use smooth_depth and table.
+
+    min_height, max_height : what rises less above the table is the table. Between the two it is
+        `sigmas` deviations of the table's own height, which grow with the square of the distance
+    rim : pixels that rise that part of it join an object within `reach`
+    border : parts are joined where their common border is less of a boundary than that (0 to 1)
+    overlap : parts whose footprints share that part of the smaller one may be one object
+    margin : how far beside the seen table an object may stand
+    min_area : objects that show less of themselves are dropped, metres squared
+    """
+
+    min_height: float = 0.004
+    max_height: float = 0.015
+    sigmas: float = 3.5
+    rim: float = share(0.7)
+    reach: float = 0.008
+    border: float = share(0.45)
+    overlap: float = share(0.3)
+    margin: float = 0.03
+    min_area: float = 0.0007
+    smooth_depth: SmoothDepthConfig = field(default_factory=SmoothDepthConfig)
+    table: TableConfig = field(default_factory=TableConfig)
+    concave_edges: ConcaveEdgesConfig = field(default_factory=ConcaveEdgesConfig)
+    components: ComponentsConfig = field(default_factory=ComponentsConfig)
+    footprints: FootprintsConfig = field(default_factory=FootprintsConfig)
+    vivid_colour: VividColourConfig = field(default_factory=VividColourConfig)
+    concavities: ConcavitiesConfig = field(default_factory=ConcavitiesConfig)
+    prompt: PromptConfig = field(default_factory=PromptConfig)
