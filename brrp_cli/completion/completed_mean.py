@@ -47,7 +47,9 @@ def completed_grid(
     doubtful &= ~empty
     asked[doubtful] = _network(nodes[doubtful], part)
     logits = np.full(empty.shape, -config.limit, np.float16)
-    logits[~empty] = _with_crust(asked[~empty], nodes[~empty], part, config)
+    spacing = float(np.linalg.norm(nodes[1, 0, 0] - nodes[0, 0, 0]))
+    shell = max(config.shell, config.shell_nodes * spacing)
+    logits[~empty] = _with_crust(asked[~empty], nodes[~empty], part, shell, config)
     return logits
 
 
@@ -64,16 +66,16 @@ def _doubled(values: Floats, axis: int, count: int) -> Floats:
     return np.moveaxis(found[:count], 0, axis)
 
 
-def _with_crust(logits: Floats, points: Array, part: VisiblePart, config: MeanConfig) -> Array:
-    """The network's logits (n,) at points (n, 3), limited. What was seen has some thickness,
+def _with_crust(
+    logits: Floats, points: Array, part: VisiblePart, shell: float, config: MeanConfig
+) -> Array:
+    """The network's logits (n,) at points (n, 3), limited. What was seen is `shell` metres thick,
     however thin the walls are that the network thinks of."""
     limited = np.clip(logits, -config.limit, config.limit)
     behind = -depth_behind(points, part.frame)
     own = at_pixels(points, part.frame.segmap, part.frame) == part.object_id
-    shell = (
-        own & (np.nan_to_num(behind, nan=np.inf) < config.shell) & (behind > -config.shell_before)
-    )
-    return np.where(shell, np.maximum(limited, config.shell_logit), limited)
+    crust = own & (np.nan_to_num(behind, nan=np.inf) < shell) & (behind > -config.shell_before)
+    return np.where(crust, np.maximum(limited, config.shell_logit), limited)
 
 
 def empty_space(

@@ -248,9 +248,10 @@ class MeanConfig:
     `sure` widens it by `doubt` metres for each unit. An object that none explains is completed on a
     grid of about `nodes` nodes by a network, which is evaluated at every node where the coarse ones
     around are not all `beyond_doubt`; its logit is `shell_logit` at least for `shell` metres behind
-    what is seen of it, and `shell_before` metres in front. Space is empty that lies more than
-    `carve_depth` in front of the measured depth, or `carve_plane` below the plane, or less than
-    `carve_behind` behind what is no object's and more than `carve_pixels` from the mask.
+    what is seen of it, or `shell_nodes` of the grid's spacings where these are longer, and
+    `shell_before` metres in front. Space is empty that lies more than `carve_depth` in front of the
+    measured depth, or `carve_plane` below the plane, or less than `carve_behind` behind what is no
+    object's and more than `carve_pixels` from the mask.
     """
 
     nodes: int = 200_000
@@ -259,8 +260,9 @@ class MeanConfig:
     doubt: float = 0.01
     limit: float = 5.0
     beyond_doubt: float = 1.5
-    shell: float = 0.006
-    shell_logit: float = 1.0
+    shell: float = 0.004
+    shell_nodes: float = 1.3
+    shell_logit: float = 2.0
     shell_before: float = 0.001
     carve_depth: float = 0.006
     carve_plane: float = 0.004

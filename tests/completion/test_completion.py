@@ -20,6 +20,8 @@ from brrp_cli.observation.support_plane import Plane
 from brrp_cli.shapes import solids
 
 CONFIG, MEAN = CompletionConfig(), MeanConfig()
+# What the network says, without a crust.
+BARE = replace(MEAN, shell=0.0, shell_nodes=0.0, shell_before=0.0)
 
 
 def photographed(mesh, T_cam_mesh):
@@ -93,13 +95,15 @@ def test_a_cup_that_is_looked_into_stays_hollow():
 def test_what_is_seen_has_some_thickness_whatever_the_network_says():
     frame = photographed(solids.beaker(0.04, 0.04, 0.06, 0.004), placed(0.0, 0.0, 0.0))
     nodes, crusted, empty = completed(frame)
-    _, bare, _ = completed(frame, replace(MEAN, shell=0.0))
+    _, bare, _ = completed(frame, BARE)
     with_crust, without = (
         grid.values.astype(float).ravel()[~empty.ravel()] for grid in (crusted, bare)
     )
     points = nodes.reshape(-1, 3)[~empty.ravel()]
     behind = -depth_behind(points, frame)
-    seen = (at_pixels(points, frame.segmap, frame) == 5) & (behind > -0.001) & (behind < MEAN.shell)
+    thickness = max(MEAN.shell, MEAN.shell_nodes * crusted.spacing)
+    own = at_pixels(points, frame.segmap, frame) == 5
+    seen = own & (behind > -MEAN.shell_before) & (behind < thickness)
     assert (without[seen] < 0).any()
     assert (with_crust[seen] >= MEAN.shell_logit).all()
     np.testing.assert_array_equal(with_crust[~seen], without[~seen])
@@ -108,7 +112,7 @@ def test_what_is_seen_has_some_thickness_whatever_the_network_says():
 @pytest.mark.parametrize("nodes", [20_000, 60_000])
 def test_the_lattice_is_the_networks_where_it_counts(nodes):
     frame = photographed(box(), placed(0.0, 0.0, 0.3))
-    config = replace(MEAN, nodes=nodes, shell=0.0)
+    config = replace(BARE, nodes=nodes)
     part = part_of(frame)
     extent = part.extent
     around = np.stack([extent.min(axis=0) - 0.01, extent.max(axis=0) + 0.01])
