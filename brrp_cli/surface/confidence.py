@@ -129,7 +129,7 @@ def _around_stored_mesh(
     """The same along the normals of a recognised object's mesh, which no grid makes coarser; None
     where the frame contradicts the stored shape."""
     through = along_normals(posterior, number, config)
-    best = moved_to_level(through, config.level)
+    best = moved_to_level(through, config.level, through.own)
     if best.off > config.most_off:
         return None
     shape = placed(posterior, number)

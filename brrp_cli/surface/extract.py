@@ -41,14 +41,17 @@ def extract_surface(
     """
     if isinstance(posterior, HypothesisPosterior) and posterior.dominant is not None:
         through = along_normals(posterior, posterior.dominant, config)
-        moved = moved_to_level(through, config.level)
-        check_finite("The surface", vertices=moved.vertices, uncertainty=moved.deviation)
+        # Other placements of the object, its handle elsewhere, say how sure this one is; a surface
+        # between them would be that of nothing.
+        moved = moved_to_level(through, config.level, through.own)
+        deviation = moved_to_level(through, config.level).deviation
+        check_finite("The surface", vertices=moved.vertices, uncertainty=deviation)
         if moved.off <= config.most_off:
             shape = placed(posterior, posterior.dominant).shape
             return Surface(
                 moved.vertices,
                 shape.faces.astype(np.int64),
-                moved.deviation,
+                deviation,
                 posterior.surface_unit,
                 shape.colours,
             )

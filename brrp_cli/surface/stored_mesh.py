@@ -25,7 +25,8 @@ class AlongNormals:
     """Occupancy on the way through the surface of a placed shape, along its vertices' normals.
 
     vertices, normals : (n, 3), metres, camera frame; way : (steps, n) metres along the normals,
-    ascending; particles : (P, steps, n) occupancy of each particle; mean : (steps, n)
+    ascending; particles : (P, steps, n) occupancy of each particle; mean : (steps, n), over all of
+    them; own : (steps, n), over those of the placed shape alone
     """
 
     vertices: Array
@@ -33,6 +34,7 @@ class AlongNormals:
     way: Array
     particles: NDArray[np.float32]
     mean: NDArray[np.float32]
+    own: NDArray[np.float32]
 
 
 @dataclass(frozen=True)
@@ -75,7 +77,11 @@ def along_normals(
         logits[posterior.which == each] += line.astype(np.float32)
     particles = occupancy(logits)
     mean_occupancy = np.tensordot(posterior.shares, particles, axes=1).astype(np.float32)
-    return AlongNormals(vertices, normals, way, particles, mean_occupancy)
+    mine = posterior.which == number
+    own = np.tensordot(
+        posterior.shares[mine] / posterior.shares[mine].sum(), particles[mine], axes=1
+    )
+    return AlongNormals(vertices, normals, way, particles, mean_occupancy, own.astype(np.float32))
 
 
 def placed(posterior: HypothesisPosterior, number: int) -> PlacedShape:
@@ -85,10 +91,12 @@ def placed(posterior: HypothesisPosterior, number: int) -> PlacedShape:
     return shape
 
 
-def moved_to_level(through: AlongNormals, level: float) -> Moved:
-    """Each vertex where occupancy falls through `level`, next to where it was; at the end of the
-    way that comes nearest to it where it does not."""
-    above = through.mean - level
+def moved_to_level(
+    through: AlongNormals, level: float, occupancy_along: NDArray[np.float32] | None = None
+) -> Moved:
+    """Each vertex where occupancy, by default the mean over all particles, falls through `level`,
+    next to where it was; at the end of the way that comes nearest to it where it does not."""
+    above = (through.mean if occupancy_along is None else occupancy_along) - level
     falls = (above[:-1] >= 0) & (above[1:] < 0)
     middle = np.abs(through.way[:-1] + through.way[1:])
     row = np.argmin(np.where(falls, middle, np.inf), axis=0)
