@@ -6,6 +6,7 @@ import inspect
 import re
 import tomllib
 from pathlib import Path
+from typing import Any
 
 import click
 import markdown
@@ -25,10 +26,11 @@ from documentation import (
 from markdown.extensions.toc import slugify
 
 from brrp_cli.cli import main
+from brrp_cli.commands.method_options import OneOf
 
 REFERENCE = ROOT / "docs" / "commands.md"
 PLACEHOLDER = re.compile(r"^(COMMAND|NAME|[A-Z]+|\.\.\.)$")
-CHECKED_TYPES = (click.Choice, click.IntRange, click.FloatRange)
+CHECKED_TYPES = (click.Choice, click.IntRange, click.FloatRange, OneOf)
 
 
 def all_commands(
@@ -62,7 +64,7 @@ def check_call(arguments: list[str], *, complete: bool) -> None:
         parser = command.make_parser(context)
         values, rest, order = parser.parse_args(list(arguments))
         for param in order:
-            value = values.get(str(param.name))
+            value: Any = values.get(str(param.name))
             checked = isinstance(param.type, CHECKED_TYPES) and isinstance(value, str)
             if checked and not PLACEHOLDER.match(value):
                 param.type.convert(value, param, context)
