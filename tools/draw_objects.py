@@ -34,7 +34,7 @@ LABEL = 18  # pixels
 def column(result: StoredResult, object_id: int, name: str) -> NDArray[np.uint8]:
     """(LABEL + 2 SIZE, SIZE, 3) uint8: an object from the camera's side and from behind."""
     surface = result.surfaces[object_id]
-    T_cam_frame = np.linalg.inv(result.T_frame_cam)
+    T_cam_frame = np.linalg.inv(result.T_frame_cam).astype(np.float64)
     centre = (surface.vertices.min(axis=0) + surface.vertices.max(axis=0)) / 2
     # The normal of the table; without one, the image's upwards.
     up = -result.T_frame_cam[:3, 1] if result.plane is None else result.plane.normal

@@ -6,6 +6,7 @@ import inspect
 import re
 import tomllib
 from pathlib import Path
+from typing import Any
 
 import click
 import markdown
@@ -63,7 +64,7 @@ def check_call(arguments: list[str], *, complete: bool) -> None:
         parser = command.make_parser(context)
         values, rest, order = parser.parse_args(list(arguments))
         for param in order:
-            value = values.get(str(param.name))
+            value: Any = values.get(str(param.name))
             checked = isinstance(param.type, CHECKED_TYPES) and isinstance(value, str)
             if checked and not PLACEHOLDER.match(value):
                 param.type.convert(value, param, context)
