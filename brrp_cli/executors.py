@@ -18,7 +18,7 @@ from typing import Any
 from brrp_cli.errors import BrrpError, unexpected
 
 # Seconds that a worker which is to stop may take to end by itself.
-PATIENCE = 1.0
+PATIENCE = 5.0
 # Seconds without a task at work after which it is asked whether processes start at all, and what
 # one that does nothing may take.
 _START, _PROBE = 10.0, 60.0

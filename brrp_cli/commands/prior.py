@@ -36,6 +36,12 @@ def command() -> None:
 
     What stays is not built again, and the result has the bytes that a build of all meshes together
     would have. `brrp build-prior` in place of these makes a prior mirror folders of meshes.
+
+    \b
+    Example:
+      brrp prior list
+      brrp prior add meshes/mug.obj --prior prior/
+      brrp prior show mug --prior prior/
     """
 
 

@@ -168,6 +168,26 @@ class VerificationConfig:
 
 
 @dataclass(frozen=True)
+class ColourConfig:
+    """Which of the placements that depth cannot tell apart has the colours of the image.
+
+    The best placement is turned about each axis of its box in `turns` steps, both ways up; of those
+    whose alignment score is within `alike` of its own the one with the best colours is taken, if
+    their correlation is `better` by so much. Colours are compared at `vertices` vertices, of which
+    `least_seen` have to be within `near` metres of the measured depth; what differs by less than
+    `plain` (of 255) is of one colour.
+    """
+
+    turns: int = 24
+    alike: float = 0.03
+    better: float = 0.1
+    vertices: int = 1500
+    least_seen: int = 40
+    near: float = 0.01
+    plain: float = 8.0
+
+
+@dataclass(frozen=True)
 class SearchConfig:
     """Hypotheses about one stored object's pose.
 
@@ -222,6 +242,7 @@ class SearchConfig:
     distinct: float = 0.0015
     kept: int = 6
     alignment_score: VerificationConfig = field(default_factory=VerificationConfig)
+    colour: ColourConfig = field(default_factory=ColourConfig)
 
 
 @dataclass(frozen=True)

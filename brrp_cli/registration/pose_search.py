@@ -7,13 +7,14 @@ table's normal and feature matchings; what decides is what the whole image says 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from brrp_cli.config import FeatureConfig, SearchConfig
 from brrp_cli.geometry import transform_points
+from brrp_cli.registration.colour_pose import colour_agreement, turned_about_itself
 from brrp_cli.registration.initial_poses import feature_matched_poses, resting_initial_poses
 from brrp_cli.registration.model import Model
 from brrp_cli.registration.scale_scan import ObservedCloud
@@ -78,9 +79,35 @@ def search(
             return _distinct(_judged(T[: config.fine], model, verifier, config), config)
         T = _refined(T, model, verifier, points, distance, steps)
     found = _judged(T, model, verifier, config)
+    found[0] = by_colour(found[0], verifier, config)
     if found[0].alignment_score < config.settled:
         found += _of_other_sizes(found, model, verifier, config)
     return _distinct(sorted(found, key=lambda each: -each.alignment_score), config)
+
+
+def by_colour(best: Hypothesis, verifier: Verifier, config: SearchConfig) -> Hypothesis:
+    """The best placement, or the one that looks like it in depth and more like the image in
+    colour."""
+    model, colour = best.model, config.colour
+    if not model.stored.record.get("coloured"):
+        return best
+    T, _ = _best(
+        turned_about_itself(best.T_cam_model, colour.turns), model, verifier, config, config.middle
+    )
+    T = _refined(
+        T, model, verifier, config.middle_points, config.fine_distance, config.middle_steps
+    )
+    alike = [
+        each
+        for each in [best, *_judged(T, model, verifier, config)]
+        if each.alignment_score >= best.alignment_score - colour.alike
+    ]
+    agreement = [colour_agreement(e.T_cam_model, model, verifier.frame, colour) for e in alike]
+    chosen = int(np.argmax(agreement))
+    if agreement[chosen] < agreement[0] + colour.better:
+        return best
+    # Depth cannot tell them apart: the score stays, and with it the order.
+    return replace(alike[chosen], alignment_score=best.alignment_score)
 
 
 def _distinct(found: list[Hypothesis], config: SearchConfig) -> list[Hypothesis]:

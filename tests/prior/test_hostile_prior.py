@@ -202,7 +202,7 @@ HOSTILE: dict[str, tuple[Callable[[h5py.File], None], str]] = {
         lambda f: (f.__delitem__("objects"), f.__setitem__("objects", np.zeros(3))),
         "A shard is damaged",
     ),
-    "a newer schema": (lambda f: f.attrs.__setitem__("schema", 99), "newer brrp"),
+    "a newer schema": (lambda f: f.attrs.__setitem__("schema", 99), "another version of brrp"),
     "a schema of text": (lambda f: f.attrs.__setitem__("schema", "two"), "A shard is damaged"),
     "another kind": (lambda f: f.attrs.__setitem__("kind", "photos"), "no shard"),
 }

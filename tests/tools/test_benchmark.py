@@ -92,7 +92,9 @@ def test_gradient_of_the_default_is_that_of_autograd(generator):
     ).mean(dim=1)
     expected = gradient(loss, weights)
     expected[:, 0] = 0
-    found = logistic_score(weights.detach(), factors(points, grid), labels, mean)
+    found = logistic_score(
+        weights.detach(), factors(points, grid), labels, mean, torch.ones_like(mean)
+    )
     torch.testing.assert_close(found, expected, rtol=1e-5, atol=1e-5)
 
 

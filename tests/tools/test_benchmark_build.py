@@ -23,7 +23,7 @@ def test_a_mesh_is_timed_by_stages_and_a_build_as_a_whole(tmp_path):
     whole = stages.pop("whole")
     # Nothing but sums and names lies between the stages.
     assert 0.8 * whole < sum(stages.values()) <= whole
-    assert {"load", "repair", "features", "distances"} < stages.keys()
+    assert {"load", "repair", "features", "mesh"} < stages.keys()
     assert {build["workers"] for build in found["builds"]} == {1, cores()}
     assert all(build["meshes"] == 1 and build["megabytes"] > 50 for build in found["builds"])
 

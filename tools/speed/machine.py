@@ -64,12 +64,12 @@ def limits(machine: Machine, config: Config, samples: int) -> dict[str, Limit]:
 
     starts = search.matchings + 8 * search.turns
     judged = (starts + search.coarse + search.middle) * (search.model_points + search.seen_points)
-    judged += (search.fine + len(search.scales) * search.rescaled) * 2 * search.fine_points
+    judged += (search.fine + len(search.sizes) * search.rescaled) * 2 * search.fine_points
     slid = (
         search.coarse * search.coarse_points * search.coarse_steps
         + search.middle * search.middle_points * search.middle_steps
         + search.fine * search.fine_points * search.fine_steps
-        + len(search.scales) * search.rescaled * search.middle_points * search.middle_steps
+        + len(search.sizes) * search.rescaled * search.middle_points * search.middle_steps
     )
     placing = config.k * (judged * JUDGED + slid * SLID)
     placing += config.k * search.matchings * search.matching.iterations * 40

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
+from brrp_cli.config.segmentation import TableConfig
 from brrp_cli.geometry import backproject
 from brrp_cli.observation.support_plane import largest_plane
 from brrp_cli.segmentation.table_plane import Table, find_table
@@ -45,7 +46,7 @@ def table_residual(depth: NDArray[np.floating], K: NDArray[np.float64]) -> Table
     """The residual of depth (H, W), metres, 0 = no return. Errors: FrameError without a table."""
     valid = depth > 0
     points = backproject(depth, K).astype(np.float64)
-    found = find_table(points[valid], seed=0)
+    found = find_table(points[valid], 0, None, TableConfig())
     normal, offset = found.plane.normal, found.plane.offset
     rays = backproject(np.ones(depth.shape), K).astype(np.float64)
     for _ in range(3):
@@ -226,7 +227,14 @@ def face_residuals(
         mask = ndimage.binary_erosion((masks == number) & (depth > 0), iterations=4)
         if mask.sum() < FACE_PIXELS:
             continue
-        model = largest_plane(points[mask], FACE_TOLERANCE, 500, int(number))
+        model = largest_plane(
+            points[mask],
+            int(number),
+            tolerance=FACE_TOLERANCE,
+            iterations=500,
+            drawn_points=4_000,
+            min_points=100,
+        )
         if model is None:
             continue
         distance = points @ model[:3] + model[3]
