@@ -74,8 +74,8 @@ def _with_crust(
     limited = np.clip(logits, -config.limit, config.limit)
     behind = -depth_behind(points, part.frame)
     own = at_pixels(points, part.frame.segmap, part.frame) == part.object_id
-    crust = own & (np.nan_to_num(behind, nan=np.inf) < shell) & (behind > -config.shell_before)
-    return np.where(crust, np.maximum(limited, config.shell_logit), limited)
+    in_shell = own & (np.nan_to_num(behind, nan=np.inf) < shell) & (behind > -config.shell_before)
+    return np.where(in_shell, np.maximum(limited, config.shell_logit), limited)
 
 
 def empty_space(

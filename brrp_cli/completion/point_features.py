@@ -39,7 +39,7 @@ def point_features(points: Array, part: VisiblePart) -> Features:
     # From pixels to metres at the point's own depth.
     metres = np.where(visible, points[:, 2] / frame.K[0, 0], 0.0)
     silhouette = part.silhouette.ravel()[pixel] * metres
-    local_thickness = part.limbs.ravel()[pixel] * metres
+    local_thickness = part.thickness.ravel()[pixel] * metres
 
     outside = outside_hull(points, part.facets)
     away, nearest = cKDTree(part.seen).query(points)

@@ -11,7 +11,7 @@ from brrp_cli.frames.frame import BACKGROUND, Frame
 
 Image = NDArray[np.float32]
 
-# Pixels along the longer side of the image that limbs are measured in: a limb of a large silhouette
+# Pixels along the longer side of the image that thickness is measured in: a handle of a large one
 # is many pixels wide.
 SIDE = 100
 
@@ -25,10 +25,10 @@ def silhouettes(frame: Frame, object_id: int, radii: int) -> tuple[Image, Image]
         slice(max(0, int(each.min()) - margin), int(each.max()) + margin + 1)
         for each in (rows, columns)
     )
-    silhouette, limbs = np.zeros((2, *frame.shape), dtype=np.float32)
+    silhouette, thickness = np.zeros((2, *frame.shape), dtype=np.float32)
     silhouette[window] = within_silhouette(frame.segmap[window])
-    limbs[window] = _thinned_thickness(silhouette[window], radii)
-    return silhouette, limbs
+    thickness[window] = _thinned_thickness(silhouette[window], radii)
+    return silhouette, thickness
 
 
 def within_silhouette(segmap: NDArray[np.integer]) -> Image:

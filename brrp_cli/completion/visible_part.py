@@ -45,7 +45,7 @@ class VisiblePart:
     middle of a round thing with that front and width, heights along `up`
     free : share of the points halfway between two seen ones that are seen to be free: none in a
     solid block, a third in a bowl that is looked into
-    silhouette, limbs : (H, W) pixels, of silhouette.py
+    silhouette, thickness : (H, W) pixels, of silhouette.py
     """
 
     frame: Frame
@@ -69,7 +69,7 @@ class VisiblePart:
     profile: RadialProfile
     free: float
     silhouette: Image
-    limbs: Image
+    thickness: Image
     config: CompletionConfig
 
     @property
@@ -107,7 +107,7 @@ def visible_part(
         feet = seen - height[:, None] * up
         height_map = height_map_over(points, plane, config)
         top = float(np.quantile(height, config.most[1]))
-    silhouette, limbs = silhouettes(frame, object_id, config.radii)
+    silhouette, thickness = silhouettes(frame, object_id, config.radii)
     facets = hull_facets(np.concatenate([seen, feet]), config.thickness)
     sight = seen.mean(axis=0)
     across = normalise(np.cross(up, sight))
@@ -142,7 +142,7 @@ def visible_part(
         profile=radial_profile(seen @ up, radii, outward),
         free=_free_between(seen, frame),
         silhouette=silhouette,
-        limbs=limbs,
+        thickness=thickness,
         config=config,
     )
 

@@ -191,18 +191,19 @@ class ColourConfig:
 class SearchConfig:
     """Hypotheses about one stored object's pose.
 
-    Starts are `matchings` feature matchings and every resting pose turned `turns` times. The best
-    `coarse` of them slide `coarse_steps` steps with `coarse_points` observed points, which reach
-    the surface from `coarse_distance`; the best `middle` of those, and then the best `fine`, slide
-    again, each with more points. A stored object has its stored size. That it is something of the
-    kind, of another size, is a hypothesis of its own, with a size that is refined with the pose:
-    the best `rescaled` placements begin it at `sizes` times the true size, observed points pull
-    from `size_distance` metres, and sizes whose logarithm is within `least_size_change` of 0 or
-    beyond `most_size` are dropped. Its alignment score falls by size_cost, which over `sharpness`
-    (see WeighConfig) is the log odds against another size, and by size_spread_cost * ln(size)^2. No
-    other size is tried where the score reaches `settled`, and nothing is refined further where none
-    of the placements reaches `hopeless` or all stay `beaten` behind another model's. Of placements
-    whose surfaces lie within `distinct` metres the best is kept, `kept` in all.
+    Initial poses are `matchings` feature matchings and every resting pose turned `turns` times. The
+    best `coarse` of them are refined `coarse_steps` steps with `coarse_points` observed points,
+    which reach the surface from `coarse_distance`; the best `middle` of those, and then the best
+    `fine`, are refined again, each with more points. A stored object has its stored size. That it
+    is something of the kind, of another size, is a hypothesis of its own, with a size that is
+    refined with the pose: the best `rescaled` placements begin it at `sizes` times the true size,
+    observed points pull from `size_distance` metres, and sizes whose logarithm is within
+    `least_size_change` of 0 or beyond `most_size` are dropped. Its alignment score falls by
+    size_cost, which over `sharpness` (see WeighConfig) is the log odds against another size, and by
+    size_spread_cost * ln(size)^2. No other size is tried where the score reaches `settled`, and
+    nothing is refined further where none of the placements reaches `hopeless` or all stay `beaten`
+    behind another model's. Of placements whose surfaces lie within `distinct` metres the best is
+    kept, `kept` in all.
     """
 
     turns: int = 24

@@ -17,8 +17,8 @@ class ObservedAppearanceConfig:
         mixed
     height_quantile, width_share : of the points, of which stray ones do not count for the size
     normal_radius, normal_neighbours : of the points that a normal is fitted to
-    in_front : what stands in front of an outline by more hides something; reach : pixels within
-        which an outline is compared with others
+    in_front : what stands in front of a silhouette by more hides something; reach : pixels within
+        which a silhouette is compared with others
     """
 
     above_plane: float = 0.004

@@ -46,9 +46,9 @@ def resting_initial_poses(
     more = high - low - _extents(seen, directions, config)
     shift = np.where(more > config.hidden, more, 0)[:, None] / 2 * directions
     starts = []
-    for each, slid in zip(T, shift, strict=True):
+    for each, hidden_part in zip(T, shift, strict=True):
         starts.append(each)
-        for way in (slid, -slid) if slid.any() else ():
+        for way in (hidden_part, -hidden_part) if hidden_part.any() else ():
             starts.append(each.copy())
             starts[-1][:2, 3] += way
     return list(np.linalg.inv(T_plane_cam) @ np.stack(starts))

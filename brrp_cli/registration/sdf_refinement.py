@@ -1,4 +1,4 @@
-"""Refine many placements at once: observed points slide onto the model's surface.
+"""Point-to-SDF refinement of many placements at once: observed points come onto the surface.
 
 Gauss-Newton on the sum of squared signed distances, which a grid holds: point-to-plane ICP
 without a search for the nearest point, whose plane is that of the surface and not of a sample.

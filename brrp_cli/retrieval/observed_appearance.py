@@ -23,7 +23,7 @@ class SeenObject:
     colours : (k, 3) RGB 0 to 255 and shares : (k,); None where the frame has no colours
     pairs : (PAIR_BINS,), see descriptors/point_pairs.py; None where there are too few points
     size : (3,) metres, height above the plane and footprint; None without plane or points
-    hidden : share of the outline that ends at something in front of it or at the image's edge
+    hidden : share of the silhouette that ends at something in front of it or at the image's edge
     """
 
     colours: NDArray[np.float64] | None
@@ -102,11 +102,11 @@ def _hidden(frame: Frame, mask: NDArray[np.bool_], config: ObservedAppearanceCon
     high = np.array([rows.max(), columns.max()]) + reach + 1
     box = tuple(slice(a, b) for a, b in zip(low, high, strict=True))
     here = mask[box]
-    outline = here & ~binary_erosion(here)
+    silhouette = here & ~binary_erosion(here)
     depth = np.where(frame.valid[box], frame.points[box][..., 2], np.inf)
     others = np.where(here, np.inf, depth)
     nearest = minimum_filter(others, size=2 * reach + 1, mode="nearest")
     covered = (nearest < depth - config.in_front) & np.isfinite(depth)
     border = np.ones(mask.shape, dtype=bool)
     border[reach:-reach, reach:-reach] = False
-    return float((outline & (covered | border[box])).sum() / max(outline.sum(), 1))
+    return float((silhouette & (covered | border[box])).sum() / max(silhouette.sum(), 1))

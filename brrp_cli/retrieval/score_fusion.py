@@ -5,7 +5,7 @@ For object i of the frame, stored object c and light g, with n stored objects:
     s_i(c, g) = offset + colour (B_i(c, g) - 1) + pairs (1 - h_i) (D_i(c) - 1) + size Z_i(c) - ln n
 
 B and D are Bhattacharyya coefficients of colours and of point pairs, in [0, 1], h the hidden share
-of the outline and Z <= 0 what speaks against the size. s is the log of the odds of c against
+of the silhouette and Z <= 0 what speaks against the size. s is the log of the odds of c against
 "not in the prior" in light g. The light l of the scene is common to its objects, and that on each
 of them is near it:
 
@@ -29,7 +29,7 @@ class Similarity:
     """How alike one seen object is to some stored objects.
 
     rows : (m,) which of the prior's n objects; colour : (g, m), one row for each light;
-    pairs : (m,); size : (m,), 0 or less; hidden : share of the outline
+    pairs : (m,); size : (m,), 0 or less; hidden : share of the silhouette
     """
 
     rows: NDArray[np.int64]

@@ -51,8 +51,8 @@ def size_penalty(
     """What speaks against the size (m,), 0 or less, in the resting pose that fits best.
 
     size : (3,) seen height and footprint, metres; stored : (m, r, 3), NaN where there is no pose;
-    hidden : share of the outline that ends at something in front. What is seen can be smaller than
-    the object, the more so the more is hidden, but not larger.
+    hidden : share of the silhouette that ends at something in front. What is seen can be smaller
+    than the object, the more so the more is hidden, but not larger.
     """
     if size is None:
         return np.zeros(len(stored), np.float32)

@@ -35,7 +35,8 @@ def directions(count: int) -> NDArray[np.float64]:
 
 
 def views_around(mesh: PaintedMesh, count: int, rays: int = RAYS) -> list[SeenSide]:
-    """The mesh from `count` directions, with about `rays` parallel rays through its outline's box.
+    """The mesh from `count` directions, with about `rays` parallel rays through its silhouette's
+    box.
 
     The same mesh gives the same sides: nothing is drawn at random.
     """
