@@ -53,13 +53,14 @@ def serving(plan: Plan) -> Iterator[str]:
             if start >= len(whole):
                 self.send_error(416)
                 return
+            # Before the answer begins: who has its head may ask for more at once.
+            end = start + plan.cuts.pop(0) if plan.cuts else len(whole)
             self.send_response(206 if asked and plan.ranges else 200)
             if asked and plan.ranges:
                 self.send_header("Content-Range", f"bytes {start}-{len(whole) - 1}/{len(whole)}")
             if not plan.chunked:
                 self.send_header("Content-Length", str(len(whole) - start))
             self.end_headers()
-            end = start + plan.cuts.pop(0) if plan.cuts else len(whole)
             self.wfile.write(whole[start:end])
 
     server = http.server.ThreadingHTTPServer(("127.0.0.1", 0), Handler)
