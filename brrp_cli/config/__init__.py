@@ -129,6 +129,8 @@ class SurfaceConfig:
     fidelity : metres, standard deviation of a stored mesh from its object
     keep_distance : metres; a component of the level set further from every observed point is
     hallucinated
+    one_piece : whether an object is one piece; the published methods keep every part near what was
+    seen, cavities included
     seen_share : of the observed points that a part near them must own to be joined to the largest,
     a tenth of it where the part has a share `volume_share` of the largest's volume; route_radius :
     metres, of what joins them, which is two nodes thick at least
@@ -139,6 +141,7 @@ class SurfaceConfig:
     finest: float = 0.002
     nodes: int = 300_000
     keep_distance: float = 0.01
+    one_piece: bool = True
     seen_share: float = share(0.03)
     volume_share: float = share(0.1)
     route_radius: float = 0.003
@@ -388,7 +391,9 @@ class Config:
 
 PRESETS = {
     "default": Config(preset="default"),
-    "paper": Config(preset="paper", surface=SurfaceConfig(level=0.5), hypotheses=None),
+    "paper": Config(
+        preset="paper", surface=SurfaceConfig(level=0.5, one_piece=False), hypotheses=None
+    ),
 }
 
 
@@ -424,7 +429,7 @@ class PointSDFConfig:
     difference quotients across the surface
     """
 
-    surface: SurfaceConfig = SurfaceConfig(level=0.3)
+    surface: SurfaceConfig = SurfaceConfig(level=0.3, one_piece=False)
     observation: ObservationConfig = field(default_factory=ObservationConfig)
     min_points: int = 16
     half_width: float = 0.2
@@ -443,7 +448,7 @@ class VPrismConfig:
     """
 
     observation: ObservationConfig = field(default_factory=_vprism_observation)
-    surface: SurfaceConfig = SurfaceConfig(level=0.5)
+    surface: SurfaceConfig = SurfaceConfig(level=0.5, one_piece=False)
     hinge_spacing: float = 0.05
     hinge_radius: float = 0.15
     surface_hinges: int = 32

@@ -65,6 +65,23 @@ def one_piece(
     return _without_cavities(piece)
 
 
+def near_observed(occupied: Region, observed: NDArray[np.floating], farthest: float) -> Region:
+    """The connected parts of `occupied` (nx, ny, nz) that come within `farthest` nodes of an
+    observed point (n, 3), in nodes."""
+    from scipy.ndimage import distance_transform_edt
+    from skimage.measure import label
+
+    cells = np.rint(observed).astype(np.int64)
+    cells = cells[((cells >= 0) & (cells < occupied.shape)).all(axis=1)]
+    if not len(cells):
+        return np.zeros_like(occupied)
+    far = np.ones(occupied.shape, dtype=bool)
+    far[tuple(cells.T)] = False
+    near = distance_transform_edt(far) <= farthest
+    parts = label(occupied, connectivity=3)
+    return np.asarray(np.isin(parts, np.unique(parts[near & occupied])) & occupied)
+
+
 def _seen_of(
     parts: NDArray[np.integer], observed: NDArray[np.floating], farthest: float, count: int
 ) -> NDArray[np.int64]:

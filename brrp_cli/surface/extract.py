@@ -12,7 +12,7 @@ from brrp_cli.errors import BrrpError
 from brrp_cli.finite import check_finite
 from brrp_cli.inference.hypothesis_posterior import HypothesisPosterior
 from brrp_cli.reconstruction import Axes, OccupancyPosterior, Surface
-from brrp_cli.surface.connect import one_piece
+from brrp_cli.surface.connect import near_observed, one_piece
 from brrp_cli.surface.stored_mesh import along_normals, moved_to_level, placed
 
 # How far, at least, the occupancy of what is inside lies above the level: 10 micrometres.
@@ -91,14 +91,18 @@ def level_set(
     config: SurfaceConfig,
 ) -> LevelSet | None:
     """Marching cubes at `level` on occupancy (nx, ny, nz) at the nodes of `axes`, metres, camera
-    frame: one piece (connect.py), which the points `observed` (n, 3) lie on. None if nothing is
-    left.
+    frame: the parts near the points `observed` (n, 3), as one piece where the configuration asks
+    for it (connect.py). None if nothing is left.
     """
     from skimage.measure import marching_cubes
 
     origin = np.array([axis[0] for axis in axes])
     spacing = float(axes[0][1] - axes[0][0])
-    kept = one_piece(volume, level, (observed - origin) / spacing, spacing, config)
+    seen = (observed - origin) / spacing
+    if config.one_piece:
+        kept = one_piece(volume, level, seen, spacing, config)
+    else:
+        kept = near_observed(volume >= level, seen, config.keep_distance / spacing)
     if not kept.any():
         return None
     # What was dropped must not leave a surface; a border of zeros closes what touches the bounds.

@@ -1,11 +1,13 @@
 """One piece of a level set: known volumes on a grid."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import trimesh
 from skimage.measure import label, marching_cubes
 
-from brrp_cli.config import SurfaceConfig
+from brrp_cli.config import PRESETS, PointSDFConfig, SurfaceConfig, VPrismConfig
 from brrp_cli.surface.connect import one_piece
 from brrp_cli.surface.extract import level_set
 
@@ -124,3 +126,18 @@ def test_nothing_near_the_observed_points_is_nothing():
     far = faces(LEFT) + [0, 0, -9]
     assert not one_piece(two_boxes(), 0.5, far + [0, 0, -9], SPACING, CONFIG).any()
     assert not one_piece(two_boxes(), 0.5, np.zeros((0, 3)), SPACING, CONFIG).any()
+
+
+def test_the_published_methods_keep_every_part_near_what_was_seen():
+    volume = two_boxes()
+    volume[2:4, 2:4, 25:28] = 0.95
+    observed = np.concatenate([faces(LEFT), faces(RIGHT)])
+    axes = tuple(SPACING * np.arange(n) for n in volume.shape)
+    config = replace(CONFIG, one_piece=False)
+    found = level_set(volume, axes, observed * SPACING, 0.5, config)
+    assert found is not None
+    mesh = trimesh.Trimesh(found.vertices, found.faces, process=False)
+    # Both boxes, apart, and not the crumb that nobody saw.
+    assert len(mesh.split()) == 2
+    for preset in (PRESETS["paper"], VPrismConfig(), PointSDFConfig()):
+        assert not preset.surface.one_piece
