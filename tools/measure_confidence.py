@@ -5,8 +5,8 @@
 
 One line for each object, written as soon as it is known; a second run goes on where the first was
 stopped. For each confidence: whether every one of 4,000 points of the true surface lies inside, the
-share of them that does, how far the worst lies outside, and the same for the region that holds for
-each point alone, {p >= 1 - confidence}.
+share of them that does, how far the worst lies outside, how far inside they lie on average
+(growth), and the same for the region that holds for each point alone, {p >= 1 - confidence}.
 """
 
 from __future__ import annotations
@@ -168,7 +168,9 @@ def report(rows: list[dict]) -> None:
         if not with_posterior:
             continue
         print(f"{name}: {len(group)} objects, {len(group) - len(with_posterior)} without a surface")
-        print("  confidence   whole   but 1 %   within 5 mm   points   points, each alone   litre")
+        print(
+            "  confidence   whole   but 1 %   within 5 mm   points   points, each alone   litre   growth, mm"
+        )
         for confidence in CONFIDENCES:
             found = [f for r in with_posterior for f in r["found"] if f["confidence"] == confidence]
             share = np.array([f["share"] for f in found])
@@ -177,7 +179,8 @@ def report(rows: list[dict]) -> None:
                 f"  {confidence:<10} {(share == 1).mean():8.3f} {(share >= 0.99).mean():9.3f} "
                 f"{(worst < 0.005).mean():13.3f} {share.mean():8.3f} "
                 f"{np.mean([f['share_each_point'] for f in found]):20.3f} "
-                f"{np.mean([f['litre'] for f in found]):7.2f}"
+                f"{np.mean([f['litre'] for f in found]):7.2f} "
+                f"{1000 * np.mean([f['growth'] for f in found]):12.2f}"
             )
 
 

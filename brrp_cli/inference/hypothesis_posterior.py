@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from brrp_cli.inference.mean_grid import MeanGrid
 from brrp_cli.inference.placed_shape import PlacedShape
-from brrp_cli.inference.posterior import HilbertPosterior
+from brrp_cli.inference.posterior import LOGISTIC_DEVIATION, HilbertPosterior
 from brrp_cli.reconstruction import METRES, Axes
 
 if TYPE_CHECKING:
@@ -19,9 +19,6 @@ if TYPE_CHECKING:
 
     from brrp_cli.hdf5 import SharedParts
 
-# Standard deviation of the logistic distribution over 4: a surface whose occupancy is a logistic
-# function of the way across it has this over the gradient as standard deviation of its place.
-LOGISTIC_DEVIATION = np.pi / np.sqrt(3) / 4
 # No surface is less certain than this, metres.
 LARGEST = 0.05
 # Half of the difference quotients' step, metres.
@@ -187,6 +184,7 @@ _KINDS: dict[str, type[MeanGrid] | type[PlacedShape]] = {
 
 def deviation(steepness: NDArray[np.floating]) -> NDArray[np.float32]:
     """Standard deviation (n,), metres, of the place of a surface across which occupancy falls by
-    `steepness` (n,), 1/metre."""
-    steepest = np.maximum(steepness, LOGISTIC_DEVIATION / LARGEST)
-    return np.asarray(LOGISTIC_DEVIATION / steepest, dtype=np.float32)
+    `steepness` (n,), 1/metre, as a logistic function, which is steepest by a quarter of its
+    logit."""
+    found = LOGISTIC_DEVIATION / np.maximum(4 * steepness, LOGISTIC_DEVIATION / LARGEST)
+    return np.asarray(found, dtype=np.float32)

@@ -25,20 +25,10 @@ from brrp_cli.inference.hypothesis_posterior import HypothesisPosterior, MeanFun
 from brrp_cli.inference.placed_shape import PlacedShape
 from brrp_cli.inference.posterior import HilbertPosterior
 from brrp_cli.inference.svgd import groups_of, run_svgd
+from brrp_cli.observation.soft_samples import SoftSamples
 from brrp_cli.seeds import child_seed
 
 Array = NDArray[np.float64]
-
-
-@dataclass(frozen=True)
-class SoftSamples:
-    """points : (n, 3), metres, camera frame; targets : (n,) probability of being occupied;
-    measured : (n, 3), the point of the seen surface that a sample comes from, NaN for free
-    space."""
-
-    points: Array
-    targets: Array
-    measured: Array
 
 
 @dataclass(frozen=True)

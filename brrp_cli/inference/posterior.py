@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 
     from brrp_cli.hdf5 import SharedParts
 
+# The standard deviation of a logistic distribution over its scale.
+LOGISTIC_DEVIATION = np.pi / np.sqrt(3)
 # So many points at once: their products stay in the cache.
 CHUNK = 2_048
 

@@ -13,9 +13,10 @@ from brrp_cli.completion.visible_part import VisiblePart, visible_part
 from brrp_cli.config import Config, FittedMapConfig, HypothesesConfig, MeanConfig, WeighConfig
 from brrp_cli.frames.frame import Frame
 from brrp_cli.inference.hypothesis_posterior import HypothesisPosterior, MeanFunction
-from brrp_cli.inference.infer_hypotheses import Problem, SoftSamples, infer_correction
+from brrp_cli.inference.infer_hypotheses import Problem, infer_correction
 from brrp_cli.inference.mean_grid import MeanGrid, grid_over
 from brrp_cli.inference.placed_shape import PlacedShape
+from brrp_cli.inference.posterior import LOGISTIC_DEVIATION
 from brrp_cli.observation.ray_samples import ObjectObservation
 from brrp_cli.observation.sensor_noise import depth_deviation
 from brrp_cli.observation.soft_samples import soft_samples
@@ -32,9 +33,6 @@ from brrp_cli.seeds import child_rng, child_seed
 from brrp_cli.timing import timed
 
 Array = NDArray[np.float64]
-
-# The standard deviation of a logistic distribution over its scale.
-LOGISTIC_DEVIATION = np.pi / np.sqrt(3)
 
 
 def reconstruct_by_hypotheses(
@@ -163,12 +161,10 @@ def _infer(
         means.append(_completed(part, box, frame, observation.object_id, plane, config.mean))
     stiffness = np.ones(len(means))
     stiffness[: len(shapes)] = config.map.stiffness
-    points, targets, measured = soft_samples(observation, frame, config.map.behind, config.sensor)
+    samples = soft_samples(observation, frame, config.map.behind, config.sensor)
     noise = config.sensor.sure * depth_deviation(observation.center[2:], config.sensor)[0]
     return infer_correction(
-        Problem(
-            SoftSamples(points, targets, measured), tuple(means), weights, stiffness, noise, box
-        ),
+        Problem(samples, tuple(means), weights, stiffness, noise, box),
         config.map,
         seed=child_seed(seed, observation.object_id),
         device=device,

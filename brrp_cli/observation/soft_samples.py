@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtr
@@ -15,14 +17,24 @@ from brrp_cli.observation.sensor_noise import depth_deviation
 Array = NDArray[np.float64]
 
 
+@dataclass(frozen=True)
+class SoftSamples:
+    """points : (n, 3), metres, camera frame; targets : (n,) probability of being occupied;
+    measured : (n, 3), the point of the seen surface that a sample comes from, NaN for free
+    space."""
+
+    points: Array
+    targets: Array
+    measured: Array
+
+
 def soft_samples(
     observation: ObjectObservation, frame: Frame, distance: float, config: SensorConfig
-) -> tuple[Array, Array, Array]:
-    """Points (n, 3), metres, camera frame, the probability (n,) that each is in the object, and the
-    point of the seen surface (n, 3) that it comes from, NaN for free space.
+) -> SoftSamples:
+    """What an observation says of occupied and free space.
 
-    The seen surface is asked `distance` metres in front of and behind of where it was measured: the
-    measurement itself is as much outside as inside. A free sample that lies a few standard
+    The seen surface is sampled `distance` metres in front of and behind of where it was measured:
+    the measurement itself is as much outside as inside. A free sample that lies a few standard
     deviations in front of the measured depth is free for certain; at the measured depth, it may be
     either. Another object's surface is moved behind, where it is that object's.
     """
@@ -36,10 +48,10 @@ def soft_samples(
     mask = at_pixels(free, frame.segmap, frame)
     others = measured & (mask != BACKGROUND) & (mask != observation.object_id)
     free = np.concatenate([_along(free[others], distance), free[~measured]])
-    return (
-        np.concatenate([_along(seen, distance), _along(seen, -distance), free]),
-        np.concatenate([sure, 1 - sure, np.zeros(len(free))]),
-        np.concatenate([seen, seen, np.full_like(free, np.nan)]),
+    return SoftSamples(
+        points=np.concatenate([_along(seen, distance), _along(seen, -distance), free]),
+        targets=np.concatenate([sure, 1 - sure, np.zeros(len(free))]),
+        measured=np.concatenate([seen, seen, np.full_like(free, np.nan)]),
     )
 
 

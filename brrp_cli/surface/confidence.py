@@ -16,6 +16,11 @@ each point alone, and is the same where there is one particle. Nested level sets
 and a joint probability to choose among them: Bolin and Lindgren, "Excursion and contour uncertainty
 regions for latent Gaussian models", JRSS B 77 (2015), section 2.
 
+Of a recognised object the place is in doubt, and not the shape. There the region is a band around
+its mesh: all placements inside the ellipsoid that holds the true one with the given probability, at
+once (Scheffe's simultaneous confidence band; six unknowns), and what the stored mesh itself may be
+off.
+
 The posterior is what it is: where it is too sure, so is C_t. A margin d grows C_t beyond it, into
 {x outside of C_t : distance to C_t <= d and x was not seen to be empty}.
 """

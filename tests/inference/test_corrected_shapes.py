@@ -18,7 +18,7 @@ from brrp_cli.config import (
     SurfaceConfig,
 )
 from brrp_cli.geometry import transform_points
-from brrp_cli.inference.infer_hypotheses import Problem, SoftSamples, infer_correction
+from brrp_cli.inference.infer_hypotheses import Problem, infer_correction
 from brrp_cli.observation.ray_samples import observe
 from brrp_cli.observation.sensor_noise import depth_deviation
 from brrp_cli.observation.soft_samples import soft_samples
@@ -66,7 +66,7 @@ def corrected(true, model, frame_of=noisy, width=WIDTH):
     extent = np.concatenate([seen.points.astype(np.float64), shape.bounds])
     box = np.stack([extent.min(axis=0) - MAP.margin, extent.max(axis=0) + MAP.margin])
     noise = SENSOR.sure * depth_deviation(seen.center[2:], SENSOR)[0]
-    observed = SoftSamples(*soft_samples(seen, frame, MAP.behind, SENSOR))
+    observed = soft_samples(seen, frame, MAP.behind, SENSOR)
     problem = Problem(observed, (shape,), np.ones(1), np.full(1, MAP.stiffness), noise, box)
     return infer_correction(problem, MAP, seed=0)
 

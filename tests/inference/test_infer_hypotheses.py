@@ -10,12 +10,12 @@ import pytest
 from brrp_cli.config import FittedMapConfig, MeanConfig
 from brrp_cli.inference.infer_hypotheses import (
     Problem,
-    SoftSamples,
     box_grid,
     infer_correction,
     particles_of,
 )
 from brrp_cli.inference.mean_grid import MeanGrid, grid_over
+from brrp_cli.observation.soft_samples import SoftSamples
 
 WIDTH, LIMIT = 0.002, MeanConfig().limit
 # Fewer hinge points than the preset has: the same code in a fraction of a second.

@@ -41,7 +41,8 @@ def asked(frame, occupied=(), free=()):
     labels = np.arange(len(samples)) < len(occupied)
     own = frame.object_points(OWN)
     observation = ObjectObservation(OWN, own, own.mean(axis=0).astype(float), samples, labels)
-    return soft_samples(observation, frame, WAY, CONFIG)
+    found = soft_samples(observation, frame, WAY, CONFIG)
+    return found.points, found.targets, found.measured
 
 
 def test_the_deviation_grows_with_the_square_of_the_depth():
@@ -78,7 +79,7 @@ def test_the_measurement_itself_is_as_much_in_as_out(frame):
     observation = ObjectObservation(
         OWN, np.zeros((0, 3)), np.zeros(3), np.array([at(50, DEPTH)], np.float32), np.array([True])
     )
-    _, targets, _ = soft_samples(observation, frame, 0.0, CONFIG)
+    targets = soft_samples(observation, frame, 0.0, CONFIG).targets
     np.testing.assert_allclose(targets, 0.5)
 
 

@@ -21,6 +21,7 @@ from brrp_cli.config.tables import changed
 from brrp_cli.device import pick_device
 from brrp_cli.files import sha256_file
 from brrp_cli.frames.frame import BACKGROUND, Frame
+from brrp_cli.inference.posterior import LOGISTIC_DEVIATION
 from brrp_cli.methods.base import Setup
 from brrp_cli.methods.coarse_to_fine import coarse_to_fine_volume
 from brrp_cli.methods.configuration import as_record
@@ -47,9 +48,6 @@ if TYPE_CHECKING:
     from brrp_cli.methods.pointsdf.network import Decoder, PointSDF
 
 NAME = "pointsdf"
-# A logistic distribution's standard deviation over its scale, and the scale of a surface whose
-# logit has a gradient is one over that.
-LOGISTIC = np.pi / np.sqrt(3)
 CHUNK = 16_384  # points that go through the network at once
 
 
@@ -125,8 +123,8 @@ class PointSDFPosterior:
             (self.logits(vertices + step) - self.logits(vertices - step)) / (2 * size)
             for step in np.eye(3) * size
         ]
-        steepness = np.maximum(np.linalg.norm(slope, axis=0), LOGISTIC / largest)
-        return np.asarray(LOGISTIC / steepness, dtype=np.float32)
+        steepness = np.maximum(np.linalg.norm(slope, axis=0), LOGISTIC_DEVIATION / largest)
+        return np.asarray(LOGISTIC_DEVIATION / steepness, dtype=np.float32)
 
     def write(self, group: h5py.Group, shared: SharedParts) -> None:
         """Attributes decoder (its name among what is shared), center (3), scale, config (JSON);

@@ -9,7 +9,7 @@ from brrp_cli.config import PointSDFConfig
 from brrp_cli.frames.frame import Frame
 from brrp_cli.ground_truth.truth import true_mesh_in_camera
 from brrp_cli.methods.pointsdf.method import (
-    LOGISTIC,
+    LOGISTIC_DEVIATION,
     PointSDFPosterior,
     reconstruct_pointsdf,
 )
@@ -89,8 +89,8 @@ def test_the_surface_lies_where_occupancy_is_the_papers(ball):
 def test_uncertainty_of_the_surface_is_its_spread(ball):
     assert ball.surface_unit == METRES
     found = ball.surface_uncertainty(on_ball(RADIUS))
-    np.testing.assert_allclose(found, LOGISTIC * WIDTH, rtol=0.02)
-    assert pytest.approx(0.0073, abs=1e-4) == LOGISTIC * WIDTH
+    np.testing.assert_allclose(found, LOGISTIC_DEVIATION * WIDTH, rtol=0.02)
+    assert pytest.approx(0.0073, abs=1e-4) == LOGISTIC_DEVIATION * WIDTH
     flat = replace(ball, scale=1e6)
     np.testing.assert_allclose(flat.surface_uncertainty(on_ball(RADIUS)), 0.05)
     np.testing.assert_allclose(ball.uncertainty(on_ball(RADIUS)), 0.25, atol=1e-3)
