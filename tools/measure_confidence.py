@@ -169,7 +169,8 @@ def report(rows: list[dict]) -> None:
             continue
         print(f"{name}: {len(group)} objects, {len(group) - len(with_posterior)} without a surface")
         print(
-            "  confidence   whole   but 1 %   within 5 mm   points   points, each alone   litre   growth, mm"
+            "  confidence   whole   but 1 %   within 5 mm   points   points, each alone   litre"
+            "   growth, mm"
         )
         for confidence in CONFIDENCES:
             found = [f for r in with_posterior for f in r["found"] if f["confidence"] == confidence]

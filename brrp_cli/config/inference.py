@@ -1,0 +1,113 @@
+"""Prior means of hypotheses, completion, and the maps that correct them. Lengths are metres."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from brrp_cli.config.ranges import share
+
+
+@dataclass(frozen=True)
+class InferenceConfig:
+    """Hilbert map and SVGD (paper, sections III-A, III-B and IV-D)."""
+
+    hinges_per_axis: int = 12
+    hinge_half_width: float = 0.15
+    feature_floor: float = 1e-7
+    particles: int = 8
+    learning_rate: float = 0.1
+    epochs: int = 10
+    observed_batch: int = 2048
+    prior_batch: int = 256
+    lambda_observed: float = 50.0
+    lambda_prior: float = 1.0
+    lambda_norm: float = 1e-6
+
+
+@dataclass(frozen=True)
+class MeanConfig:
+    """Prior mean functions of hypotheses, as logits.
+
+    A placed shape is -(signed distance) / width, limited to +-limit; an alignment score under
+    `sure` widens it by `doubt` metres for each unit. An object that none explains is completed on a
+    grid of about `nodes` nodes by a network, which is evaluated at every node where the coarse ones
+    around are not all `beyond_doubt`; its logit is `shell_logit` at least for `shell` metres behind
+    what is seen of it, or `shell_nodes` of the grid's spacings where these are longer, and
+    `shell_before` metres in front. Space is empty that lies more than `carve_depth` in front of the
+    measured depth, or `carve_plane` below the plane, or less than `carve_behind` behind what is no
+    object's and more than `carve_pixels` from the mask.
+    """
+
+    nodes: int = 200_000
+    width: float = 0.0005
+    sure: float = 0.9
+    doubt: float = 0.01
+    limit: float = 5.0
+    beyond_doubt: float = 1.5
+    shell: float = 0.004
+    shell_nodes: float = 1.3
+    shell_logit: float = 2.0
+    shell_before: float = 0.001
+    carve_depth: float = 0.006
+    carve_plane: float = 0.004
+    carve_behind: float = 0.01
+    carve_pixels: int = 2
+
+
+@dataclass(frozen=True)
+class CompletionConfig:
+    """The shape of an object that no stored one explains (brrp_cli/completion).
+
+    cell : metres, of grids in which observed points are merged; closing : gaps of fewer cells are
+    closed
+
+    The rest belongs to the network's weights: it was trained with these numbers.
+    least : metres; smaller extents are as noisy as depth is; most : shares of the seen points
+        between which an object's size is taken: strays do not count
+    neighbours : seen points whose spread gives a normal
+    thickness : metres, standard deviation by which points in one plane, which have no hull, move
+    radii : of discs by which local thickness is measured
+    far, ratio : lengths, metres, and ratios beyond these tell nothing more; thin : metres, added
+        to what a length is divided by that may be 0
+    """
+
+    cell: float = 0.004
+    closing: int = 7
+    least: float = 0.005
+    most: tuple[float, float] = (0.02, 0.98)
+    neighbours: int = 12
+    thickness: float = 0.0005
+    radii: int = 12
+    far: float = 0.2
+    ratio: float = 4.0
+    thin: float = 0.002
+
+
+@dataclass(frozen=True)
+class FittedMapConfig:
+    """A Hilbert map whose hinge points fill the box of what was seen and of the hypotheses.
+
+    hinges : about so many, no closer than `least_spacing`; margin : of the box, metres
+    behind : metres behind and in front of the seen surface where it is sampled
+    start : standard deviation of the particles' first weights
+    stiffness : lambda_norm is so many times as large for a placed shape, which is known better than
+    a completed one; contradiction : a sample that a placed shape cannot explain by the noise counts
+    so many times, for there are few of them among all that was seen to be free around it;
+    least_weight : hypotheses that weigh less are left out
+    """
+
+    hinges: int = 1000
+    least_spacing: float = 0.01
+    margin: float = 0.02
+    feature_floor: float = 1e-7
+    particles: int = 8
+    steps: int = 40
+    learning_rate: float = 0.1
+    batch: int = 512
+    start: float = 0.3
+    behind: float = 0.004
+    lambda_observed: float = 50.0
+    lambda_norm: float = 0.5
+    stiffness: float = 8.0
+    contradiction: float = 1000.0
+    least_weight: float = share(0.01)

@@ -1,0 +1,61 @@
+"""What a frame says of space, and how far its sensor errs. Lengths are metres."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class ObservationConfig:
+    """Observed samples: surface, stratified rays, below the plane (paper, section IV-C).
+
+    min_points : valid depth points that an object needs
+    ray_bin : metres of a stratum along a ray, which holds one sample; ray_radius : of the ball
+        around the object's middle in which rays are sampled; max_ray_samples : of them, at most
+    plane_radius : metres around the scene's middle in which the support plane is looked for;
+        plane_tolerance : of its inliers; plane_iterations : of RANSAC, on plane_ransac_points
+        drawn points at most; plane_min_points : that a plane needs
+    below_draws : samples below the plane within `below_radius`, metres, of the object's middle
+    free_cell, surface_cell : metres, of grids in which samples of one label are thinned
+    """
+
+    min_points: int = 16
+    ray_bin: float = 0.2
+    ray_radius: float = 0.2
+    max_ray_samples: int = 1_000_000
+    plane_radius: float = 0.6
+    plane_tolerance: float = 0.01
+    plane_iterations: int = 1000
+    plane_ransac_points: int = 4_000
+    plane_min_points: int = 100
+    below_draws: int = 50_000
+    below_radius: float = 0.2
+    free_cell: float = 0.015
+    surface_cell: float = 0.01
+
+
+@dataclass(frozen=True)
+class SensorConfig:
+    """How far measured depth errs: a standard deviation of noise + noise_growth * depth^2, metres.
+
+    wave : metres, least standard deviation of the mean depth of a patch `patch` metres wide; more
+    is measured on the support plane, within `table_reach` metres of it, where `least_patches`
+    patches have `patch_points` pixels
+    bias : metres, standard deviation of what depth is off as a whole
+    pose_turn, pose_shift : radians and metres by which a placement may be off before anything is
+    seen
+    sure : standard deviations in front of the measured depth from which on space is free for
+    certain
+    """
+
+    noise: float = 0.0012
+    noise_growth: float = 0.0015
+    wave: float = 0.0005
+    bias: float = 0.00035
+    patch: float = 0.01
+    table_reach: float = 0.015
+    least_patches: int = 30
+    patch_points: int = 8
+    pose_turn: float = 0.05
+    pose_shift: float = 0.005
+    sure: float = 3.0

@@ -1,0 +1,149 @@
+"""Poses of stored objects: features, initial poses, search, verification, weights. Lengths are
+metres."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from brrp_cli.config.ranges import share
+
+
+@dataclass(frozen=True)
+class FeatureConfig:
+    """Clouds and FPFH features, of stored and of observed objects alike (paper, section IV-A).
+
+    Stored objects are normalised (largest half-extent 1) and multiplied by `base_scale * scale`
+    for each scale of the scan.
+    """
+
+    base_scale: float = 0.12
+    scales: tuple[float, ...] = (0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0, 1.1, 1.22, 1.34)
+    voxel: float = 0.01
+    normal_radius: float = 0.02
+    normal_neighbours: int = 30
+    fpfh_radius: float = 0.05
+    fpfh_neighbours: int = 100
+
+
+@dataclass(frozen=True)
+class RegistrationConfig:
+    """RANSAC on FPFH matches over the scale scan (paper, section IV-A)."""
+
+    draw: int = 3
+    correspondence_distance: float = 0.0075
+    edge_length: float = share(0.9)
+    iterations: int = 100_000
+    confidence: float = share(0.99)
+
+
+@dataclass(frozen=True)
+class VerificationConfig:
+    """What a frame says of a placement: shares of observed points and of model surface.
+
+    near : standard deviation of the Gaussian of observed points' distances to the model; far : an
+    observed point further away counts as this far; distance : weight of those distances
+    contradiction : weight of model surface in free space and below the plane, which counts from
+    `tolerance` on and fully from `tolerance + slope`
+    """
+
+    near: float = 0.004
+    far: float = 0.02
+    distance: float = 0.5
+    contradiction: float = 1.5
+    tolerance: float = 0.003
+    slope: float = 0.012
+
+
+@dataclass(frozen=True)
+class ColourConfig:
+    """Which of the placements that depth cannot tell apart has the colours of the image.
+
+    The best placement is turned about each axis of its box in `turns` steps, both ways up; of those
+    whose alignment score is within `alike` of its own the one with the best colours is taken, if
+    their correlation is `better` by so much. Colours are compared at `vertices` vertices, of which
+    `least_seen` have to be within `near` metres of the measured depth; what differs by less than
+    `plain` (of 255) is of one colour.
+    """
+
+    turns: int = 24
+    alike: float = 0.03
+    better: float = 0.1
+    vertices: int = 1500
+    least_seen: int = 40
+    near: float = 0.01
+    plain: float = 8.0
+
+
+@dataclass(frozen=True)
+class SearchConfig:
+    """Hypotheses about one stored object's pose.
+
+    Initial poses are `matchings` feature matchings and every resting pose turned `turns` times. The
+    best `coarse` of them are refined `coarse_steps` steps with `coarse_points` observed points,
+    which reach the surface from `coarse_distance`; the best `middle` of those, and then the best
+    `fine`, are refined again, each with more points. A stored object has its stored size. That it
+    is something of the kind, of another size, is a hypothesis of its own, with a size that is
+    refined with the pose: the best `rescaled` placements begin it at `sizes` times the true size,
+    observed points pull from `size_distance` metres, and sizes whose logarithm is within
+    `least_size_change` of 0 or beyond `most_size` are dropped. Its alignment score falls by
+    size_cost, which over `sharpness` (see WeighConfig) is the log odds against another size, and by
+    size_spread_cost * ln(size)^2. No other size is tried where the score reaches `settled`, and
+    nothing is refined further where none of the placements reaches `hopeless` or all stay `beaten`
+    behind another model's. Of placements whose surfaces lie within `distinct` metres the best is
+    kept, `kept` in all.
+    """
+
+    turns: int = 24
+    model_points: int = 300
+    least_facing: int = 6
+    stray: float = share(0.02)
+    box_points: int = 600
+    hidden: float = 0.015
+    first_share: int = 3
+    first_factor: int = 2
+    matchings: int = 4
+    matching: RegistrationConfig = field(
+        default_factory=lambda: RegistrationConfig(iterations=5_000)
+    )
+    coarse: int = 96
+    coarse_distance: float = 0.03
+    coarse_points: int = 150
+    coarse_steps: int = 6
+    middle: int = 32
+    middle_points: int = 400
+    middle_steps: int = 8
+    fine: int = 16
+    fine_distance: float = 0.01
+    fine_points: int = 1000
+    fine_steps: int = 10
+    seen_points: int = 150
+    sizes: tuple[float, ...] = (0.85, 1.18)
+    rescaled: int = 2
+    size_distance: float = 0.015
+    size_cost: float = 0.1
+    size_spread_cost: float = 0.6
+    least_size_change: float = 0.04
+    most_size: float = 0.5
+    hopeless: float = 0.1
+    beaten: float = 0.3
+    settled: float = 0.9
+    distinct: float = 0.0015
+    kept: int = 6
+    alignment_score: VerificationConfig = field(default_factory=VerificationConfig)
+    colour: ColourConfig = field(default_factory=ColourConfig)
+
+
+@dataclass(frozen=True)
+class WeighConfig:
+    """Weights of hypotheses: P(c|R) exp(sharpness * alignment score).
+
+    The hypothesis that the object is none of the stored ones has the score
+    `unknown_score` and a probability within [least_unknown, most_unknown]; no hypothesis counts as
+    less probable than `least_share`, since a retriever may be wrong.
+    """
+
+    sharpness: float = 40.0
+    unknown_score: float = 0.7
+    least_unknown: float = share(0.1)
+    most_unknown: float = share(0.9)
+    least_share: float = share(1e-3)

@@ -1,0 +1,43 @@
+"""From a posterior to a mesh. Lengths are metres."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from brrp_cli.config.ranges import share
+
+
+@dataclass(frozen=True)
+class SurfaceConfig:
+    """The surface where the mean occupancy is `level`.
+
+    A stored mesh is moved along its normals by at most `farthest` metres, and inwards or outwards
+    by no more than a share `wall_share` of the wall's thickness; the level set is looked for at
+    `steps` places of that way. Where more than a share `most_off` of its vertices would have to be
+    moved further, and where no stored object explains what is seen, the surface comes from marching
+    cubes on a grid of about `nodes` nodes, whose spacing in metres lies between `finest` and
+    `spacing`.
+    fidelity : metres, standard deviation of a stored mesh from its object
+    keep_distance : metres; a component of the level set further from every observed point is
+    hallucinated
+    one_piece : whether an object is one piece; the published methods keep every part near what was
+    seen, cavities included
+    seen_share : of the observed points that a part near them must own to be joined to the largest,
+    a tenth of it where the part has a share `volume_share` of the largest's volume; route_radius :
+    metres, of what joins them, which is two nodes thick at least
+    """
+
+    level: float = share(0.5)
+    spacing: float = 0.005
+    finest: float = 0.002
+    nodes: int = 300_000
+    keep_distance: float = 0.01
+    one_piece: bool = True
+    seen_share: float = share(0.03)
+    volume_share: float = share(0.1)
+    route_radius: float = 0.003
+    farthest: float = 0.004
+    wall_share: float = share(0.4)
+    steps: int = 17
+    fidelity: float = 0.0002
+    most_off: float = share(0.05)
