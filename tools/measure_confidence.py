@@ -26,7 +26,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from brrp_cli.api import reconstruct
 from brrp_cli.completion.completed_mean import empty_space
 from brrp_cli.config import MeanConfig, preset
-from brrp_cli.dependencies import import_open3d
+from brrp_cli.dependencies import import_library, import_open3d
 from brrp_cli.ground_truth.metrics import sample_surface
 from brrp_cli.ground_truth.scenes import find_scenes, true_mesh_in_camera
 from brrp_cli.methods.registry import METHODS
@@ -139,7 +139,12 @@ def _empty(result: Reconstruction, object_id: int, points: np.ndarray) -> np.nda
 
 
 def _outside(vertices: np.ndarray, faces: np.ndarray, points: np.ndarray) -> np.ndarray:
-    """Signed distance (n,), metres, of points to a closed mesh; positive outside."""
+    """Signed distance (n,), metres, of points to a closed mesh; positive outside.
+
+    A grown mesh may run into itself, between the jaws of a clamp. Inside is where it winds around a
+    point once or more: counting crossings would take what lies inside of it twice for outside.
+    """
+    pcu = import_library("point_cloud_utils")
     o3d = import_open3d()
     center = vertices.mean(axis=0)
     scene = o3d.t.geometry.RaycastingScene()
@@ -148,7 +153,13 @@ def _outside(vertices: np.ndarray, faces: np.ndarray, points: np.ndarray) -> np.
         o3d.core.Tensor(faces.astype(np.uint32)),
     )
     query = o3d.core.Tensor((points - center).astype(np.float32))
-    return np.asarray(scene.compute_signed_distance(query, nsamples=11).numpy())
+    distance = scene.compute_distance(query).numpy()
+    winds = pcu.triangle_soup_fast_winding_number(
+        np.asarray(vertices - center, np.float64),
+        np.asarray(faces, np.int64),
+        np.asarray(points - center, np.float64),
+    )
+    return np.where(winds > 0.5, -distance, distance)
 
 
 def report(rows: list[dict]) -> None:
