@@ -7,16 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from brrp_cli.config import CompletionConfig
 
-# Turns of the rectangle that are tried, over a quarter of a circle.
-TURNS = 24
-# Shares of the points between which the rectangle lies: strays do not count.
-MOST = (0.01, 0.99)
-# No side of a rectangle is shorter, metres.
-LEAST = 0.004
-# Points that its turn is found with.
-POINTS = 800
+Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -36,31 +29,31 @@ class Footprint:
         )
 
 
-def footprint(points: Array) -> Footprint:
+def footprint(points: Array, config: CompletionConfig) -> Footprint:
     """The rectangle about points (n, 2), metres, that is small and has the points near its sides.
 
     Area alone does not tell: two sides of a box fit as tightly with their diagonal along a side.
     """
-    few = points[:: max(1, len(points) // POINTS)]
-    step = np.pi / 2 / TURNS
-    angle = _best(few, step * np.arange(TURNS))
-    angle = _best(few, angle + step * np.linspace(-0.8, 0.8, 9))
+    few = points[:: max(1, len(points) // config.turned_points)]
+    step = np.pi / 2 / config.turns
+    angle = _best(few, step * np.arange(config.turns), config)
+    angle = _best(few, angle + step * np.linspace(-0.8, 0.8, 9), config)
     axes = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
-    low, high = np.quantile(points @ axes.T, MOST, axis=0)
-    half = np.maximum(high - low, LEAST) / 2
+    low, high = np.quantile(points @ axes.T, config.rectangle_most, axis=0)
+    half = np.maximum(high - low, config.least_side) / 2
     centre = (low + high) / 2 @ axes
     order = np.argsort(-half, kind="stable")
     return Footprint(centre, axes[order], half[order])
 
 
-def _best(points: Array, angles: NDArray[np.floating]) -> float:
+def _best(points: Array, angles: NDArray[np.floating], config: CompletionConfig) -> float:
     """Which of some angles (t,) the rectangle about points (n, 2) has."""
     along = np.stack([np.cos(angles), np.sin(angles)])
     area, near = np.ones(len(angles)), []
     for direction in (along, np.stack([-along[1], along[0]])):
         coordinates = points @ direction  # (n, t)
-        low, high = np.quantile(coordinates, MOST, axis=0)
-        area *= np.maximum(high - low, LEAST)
+        low, high = np.quantile(coordinates, config.rectangle_most, axis=0)
+        area *= np.maximum(high - low, config.least_side)
         near.append(np.minimum(np.abs(coordinates - low), np.abs(coordinates - high)))
     within = np.minimum(*near).mean(axis=0) / np.sqrt(area)
     return float(angles[np.argmin(np.log(area) + within)])

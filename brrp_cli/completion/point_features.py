@@ -22,8 +22,6 @@ Features = NDArray[np.float32]
 
 # Lengths, of which the last are the object's own, the same at all points.
 COUNT, WHOLE = 72, 9
-# Steps to where free space is looked for, in the object's sizes.
-HIGHER, ASIDE = 0.3, 0.2
 # The label of what lies outside of the image.
 NOWHERE = np.iinfo(np.int64).min
 
@@ -126,12 +124,8 @@ def point_features(points: Array, part: VisiblePart) -> Features:
 
 def _steps(part: VisiblePart) -> list[NDArray[np.floating]]:
     """Where, in the object's sizes, one looks whether free space is seen beside a point."""
-    return [
-        HIGHER * part.up,
-        (HIGHER / 3) * part.up,
-        ASIDE * part.across,
-        -ASIDE * part.across,
-    ]
+    higher, aside = part.config.higher, part.config.aside
+    return [higher * part.up, (higher / 3) * part.up, aside * part.across, -aside * part.across]
 
 
 def _free_beside(points: Array, part: VisiblePart) -> Array:

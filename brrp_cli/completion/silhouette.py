@@ -7,16 +7,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import distance_transform_edt
 
+from brrp_cli.config import CompletionConfig
 from brrp_cli.frames.frame import BACKGROUND, Frame
 
 Image = NDArray[np.float32]
 
-# Pixels along the longer side of the image that thickness is measured in: a handle of a large one
-# is many pixels wide.
-SIDE = 100
 
-
-def silhouettes(frame: Frame, object_id: int, radii: int) -> tuple[Image, Image]:
+def silhouettes(frame: Frame, object_id: int, config: CompletionConfig) -> tuple[Image, Image]:
     """`within_silhouette` and `local_thickness` (H, W) where the object is or may
     go on, 0 elsewhere."""
     rows, columns = np.nonzero(frame.segmap == object_id)
@@ -27,7 +24,7 @@ def silhouettes(frame: Frame, object_id: int, radii: int) -> tuple[Image, Image]
     )
     silhouette, thickness = np.zeros((2, *frame.shape), dtype=np.float32)
     silhouette[window] = within_silhouette(frame.segmap[window])
-    thickness[window] = _thinned_thickness(silhouette[window], radii)
+    thickness[window] = _thinned_thickness(silhouette[window], config)
     return silhouette, thickness
 
 
@@ -38,12 +35,12 @@ def within_silhouette(segmap: NDArray[np.integer]) -> Image:
     return distance_transform_edt(~ground)[1:-1, 1:-1].astype(np.float32)
 
 
-def _thinned_thickness(within: Image, radii: int) -> Image:
+def _thinned_thickness(within: Image, config: CompletionConfig) -> Image:
     """`local_thickness` of every so many pixels, repeated."""
-    step = 1 + max(within.shape) // SIDE
+    step = 1 + max(within.shape) // config.thickness_side
     if step == 1:
-        return local_thickness(within, radii)
-    thick = local_thickness(within[::step, ::step] / step, radii) * step
+        return local_thickness(within, config.radii)
+    thick = local_thickness(within[::step, ::step] / step, config.radii) * step
     rows, columns = within.shape
     repeated = thick.repeat(step, axis=0)[:rows].repeat(step, axis=1)[:, :columns]
     return np.where(within > 0, repeated, 0).astype(np.float32)

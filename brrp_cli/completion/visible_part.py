@@ -24,9 +24,6 @@ Array = NDArray[np.float64]
 
 # Of the image: as good a guess as any where there is no plane.
 UPRIGHT = np.array([0.0, -1.0, 0.0])
-# Pairs of seen points between which one looks for free space, and how far in front of the measured
-# depth that begins, metres.
-PAIRS, FREE = 1000, 0.006
 
 
 @dataclass(frozen=True)
@@ -107,7 +104,7 @@ def visible_part(
         feet = seen - height[:, None] * up
         height_map = height_map_over(points, plane, config)
         top = float(np.quantile(height, config.most[1]))
-    silhouette, thickness = silhouettes(frame, object_id, config.radii)
+    silhouette, thickness = silhouettes(frame, object_id, config)
     facets = hull_facets(np.concatenate([seen, feet]), config.thickness)
     sight = seen.mean(axis=0)
     across = normalise(np.cross(up, sight))
@@ -138,9 +135,9 @@ def visible_part(
         width=width,
         depths=-outside_hull(seen, facets),
         normals=normals,
-        rectangle=footprint(np.stack([seen @ across, seen @ ahead], axis=1)),
-        profile=radial_profile(seen @ up, radii, outward),
-        free=_free_between(seen, frame),
+        rectangle=footprint(np.stack([seen @ across, seen @ ahead], axis=1), config),
+        profile=radial_profile(seen @ up, radii, outward, config.levels),
+        free=_free_between(seen, frame, config),
         silhouette=silhouette,
         thickness=thickness,
         config=config,
@@ -159,8 +156,9 @@ def surface_normals(seen: Array, neighbours: int) -> Array:
     return np.where(away, -normals, normals)
 
 
-def _free_between(seen: Array, frame: Frame) -> float:
+def _free_between(seen: Array, frame: Frame, config: CompletionConfig) -> float:
     """Share of the points halfway between two of `seen` (n, 3) that are seen to be free."""
-    pairs = np.random.default_rng(0).integers(len(seen), size=(2, PAIRS))
+    # A feature is a function of what is seen: the pairs are the same whatever the seed.
+    pairs = np.random.default_rng(0).integers(len(seen), size=(2, config.pairs))
     behind = depth_behind(seen[pairs].mean(axis=0), frame)
-    return float((np.nan_to_num(behind, nan=0.0) > FREE).mean())
+    return float((np.nan_to_num(behind, nan=0.0) > config.free).mean())

@@ -66,7 +66,15 @@ class CompletionConfig:
         between which an object's size is taken: strays do not count
     neighbours : seen points whose spread gives a normal
     thickness : metres, standard deviation by which points in one plane, which have no hull, move
-    radii : of discs by which local thickness is measured
+    radii : of discs by which local thickness is measured; thickness_side : pixels along the longer
+        side of the image that it is measured in: a handle of a large one is many pixels wide
+    turns : of the rectangle about a footprint, over a quarter of a circle, each tried with about
+        `turned_points`; rectangle_most : shares of the points between which it lies; least_side :
+        metres, of it
+    levels : of the radial profile
+    pairs : of seen points between which free space is looked for; free : metres in front of the
+        measured depth at which it begins
+    higher, aside : steps to where free space is looked for beside a point, in the object's sizes
     far, ratio : lengths, metres, and ratios beyond these tell nothing more; thin : metres, added
         to what a length is divided by that may be 0
     """
@@ -78,6 +86,16 @@ class CompletionConfig:
     neighbours: int = 12
     thickness: float = 0.0005
     radii: int = 12
+    thickness_side: int = 100
+    turns: int = 24
+    turned_points: int = 800
+    rectangle_most: tuple[float, float] = (0.01, 0.99)
+    least_side: float = 0.004
+    levels: int = 24
+    pairs: int = 1000
+    free: float = 0.006
+    higher: float = 0.3
+    aside: float = 0.2
     far: float = 0.2
     ratio: float = 4.0
     thin: float = 0.002

@@ -24,7 +24,11 @@ class SurfaceConfig:
     seen, cavities included
     seen_share : of the observed points that a part near them must own to be joined to the largest,
     a tenth of it where the part has a share `volume_share` of the largest's volume; route_radius :
-    metres, of what joins them, which is two nodes thick at least
+    metres, of what joins them, which is two nodes thick at least; route_step : what a step from
+    node to node costs a route at least, as a negative log probability: routes are short where all
+    ways are as probable; route_least : no way is less probable than this share of the level;
+    route_margin : nodes around the parts that a route may take; route_nodes : of the largest grid
+    that is searched at once, larger ones coarsely first
     """
 
     level: float = share(0.5)
@@ -36,6 +40,10 @@ class SurfaceConfig:
     seen_share: float = share(0.03)
     volume_share: float = share(0.1)
     route_radius: float = 0.003
+    route_step: float = 0.1
+    route_least: float = share(1e-4)
+    route_margin: int = 8
+    route_nodes: int = 10_000
     farthest: float = 0.004
     wall_share: float = share(0.4)
     steps: int = 17

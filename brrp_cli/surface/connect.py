@@ -13,15 +13,8 @@ from brrp_cli.config import SurfaceConfig
 Region = NDArray[np.bool_]
 Nodes = NDArray[np.int64]
 
-# What a step from node to node costs a route at least, as a negative log probability: routes are
-# short where all ways are as probable.
-STEP = 0.1
-# No way is less probable than this share of the level.
-LEAST = 1e-4
-# Nodes around the parts that a route may take.
-MARGIN = 8
-# Nodes of the largest grid that is searched at once; what no route may cross.
-COARSE, CLOSED = 10_000, -1.0
+# What no route may cross.
+CLOSED = -1.0
 
 
 def one_piece(
@@ -60,8 +53,7 @@ def one_piece(
     piece = parts == largest
     others = [int(number) for number in np.flatnonzero(kept) if number != largest]
     if others:
-        radius = max(1.0, config.route_radius / spacing)
-        piece = _joined(piece, parts, others, volume / level, radius)
+        piece = _joined(piece, parts, others, volume / level, spacing, config)
     return _without_cavities(piece)
 
 
@@ -113,17 +105,19 @@ def _joined(
     parts: NDArray[np.integer],
     others: list[int],
     share: NDArray[np.floating],
-    radius: float,
+    spacing: float,
+    config: SurfaceConfig,
 ) -> Region:
     """`piece` and the parts `others`, each with the way to it along which the sum of negative log
-    probabilities, `share` of the level's, is least, `radius` nodes thick. The nearest, in that
-    sense, comes first, and the next may join it there."""
+    probabilities, `share` of the level's, is least. The nearest, in that sense, comes first, and
+    the next may join it there."""
+    radius = max(1.0, config.route_radius / spacing)
     wanted = np.isin(parts, others)
-    window = _window(piece | wanted, margin=MARGIN)
+    window = _window(piece | wanted, margin=config.route_margin)
     piece_in, parts_in, wanted = piece[window].copy(), parts[window], wanted[window]
-    cost = STEP - np.log(np.clip(share[window], LEAST, 1.0))
+    cost = config.route_step - np.log(np.clip(share[window], config.route_least, 1.0))
     while wanted.any():
-        way = _cheapest_way(cost, piece_in, wanted)
+        way = _cheapest_way(cost, piece_in, wanted, config.route_nodes)
         reached = parts_in == parts_in[tuple(way[-1])]
         piece_in |= reached | _thick(way, piece_in.shape, radius)
         wanted &= ~reached
@@ -132,13 +126,13 @@ def _joined(
     return result
 
 
-def _cheapest_way(cost: NDArray[np.floating], start: Region, end: Region) -> Nodes:
+def _cheapest_way(cost: NDArray[np.floating], start: Region, end: Region, most: int) -> Nodes:
     """Nodes (n, 3) of the cheapest way from one region to another.
 
-    It is first looked for on a grid of half the nodes along each axis, and then near that way: on
-    the whole grid, a search takes half a second.
+    On a grid of more than `most` nodes it is first looked for on one of half the nodes along each
+    axis, and then near that way: on the whole grid, a search takes half a second.
     """
-    if cost.size > COARSE:
+    if cost.size > most:
         padded = [(0, n % 2) for n in cost.shape]
         coarse = _halved(np.pad(cost, padded, mode="edge"), np.min)
         regions = [_halved(np.pad(region, padded), np.max) for region in (start, end)]

@@ -5,6 +5,10 @@ import pytest
 
 from brrp_cli.completion.footprint import footprint
 from brrp_cli.completion.radial_profile import radial_profile
+from brrp_cli.config import CompletionConfig
+
+CONFIG = CompletionConfig()
+LEVELS = CONFIG.levels
 
 
 def turned(points, angle):
@@ -17,7 +21,7 @@ def test_two_sides_of_a_box_give_its_rectangle(angle):
     """Two sides that meet at a corner span the whole rectangle, whichever way it is turned."""
     line = np.linspace(0, 1, 200)
     sides = np.concatenate([np.outer(line, [0.12, 0]), np.outer(line, [0, 0.05])])
-    found = footprint(turned(sides, angle) + [0.3, -0.2])
+    found = footprint(turned(sides, angle) + [0.3, -0.2], CONFIG)
     np.testing.assert_allclose(found.half, [0.06, 0.025], atol=0.003)
     middle, corner, out = turned(
         np.array([[0.06, 0.025], [0.119, 0.049], [0.06, 0.075]]), angle
@@ -30,7 +34,7 @@ def test_two_sides_of_a_box_give_its_rectangle(angle):
 @pytest.mark.parametrize("angle", [0.2, 1.0])
 def test_a_full_rectangle_is_found_too(angle):
     points = np.random.default_rng(0).uniform(-1, 1, (2000, 2)) * [0.06, 0.04]
-    found = footprint(turned(points, angle))
+    found = footprint(turned(points, angle), CONFIG)
     np.testing.assert_allclose(found.half, [0.06, 0.04], atol=0.004)
 
 
@@ -38,11 +42,11 @@ def test_strays_do_not_widen_the_rectangle():
     rng = np.random.default_rng(0)
     points = rng.uniform(-1, 1, (2000, 2)) * [0.05, 0.02]
     points[:5] += 0.5
-    assert footprint(points).half[0] < 0.06
+    assert footprint(points, CONFIG).half[0] < 0.06
 
 
 def test_a_rectangle_of_one_point_has_sides():
-    found = footprint(np.zeros((1, 2)))
+    found = footprint(np.zeros((1, 2)), CONFIG)
     assert (found.half > 0).all() and np.isfinite(found.outside(np.ones((3, 2)))).all()
 
 
@@ -57,7 +61,7 @@ def bowl(count=4000):
 
 
 def test_the_wall_of_a_bowl_lies_between_its_radii():
-    profile = radial_profile(*bowl())
+    profile = radial_profile(*bowl(), LEVELS)
     heights = np.array([0.01, 0.025, 0.04])
     outer, inner = profile.radii(heights)
     np.testing.assert_allclose(outer, 0.03 + heights, atol=0.001)
@@ -66,13 +70,13 @@ def test_the_wall_of_a_bowl_lies_between_its_radii():
 
 def test_a_can_has_no_inner_radius_and_gaps_are_filled():
     height = np.concatenate([np.linspace(0, 0.03, 200), np.linspace(0.09, 0.12, 200)])
-    profile = radial_profile(height, np.full(400, 0.04), np.ones(400))
+    profile = radial_profile(height, np.full(400, 0.04), np.ones(400), LEVELS)
     outer, inner = profile.radii(np.array([0.0, 0.06, 0.12, 0.2]))
     np.testing.assert_allclose(outer, 0.04)
     assert (inner == 0).all()
 
 
 def test_what_only_faces_the_axis_has_an_outer_radius_too():
-    profile = radial_profile(np.linspace(0, 0.1, 50), np.full(50, 0.04), -np.ones(50))
+    profile = radial_profile(np.linspace(0, 0.1, 50), np.full(50, 0.04), -np.ones(50), LEVELS)
     outer, inner = profile.radii(np.array([0.05]))
     np.testing.assert_allclose([outer[0], inner[0]], 0.04)
