@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brrp_cli.config import SurfaceConfig
-from brrp_cli.errors import ResultError
+from brrp_cli.config.tables import changed
+from brrp_cli.errors import ConfigError, ResultError
 from brrp_cli.files import parse_json
 from brrp_cli.frames.frame import Frame
 from brrp_cli.frames.npz import load_frame
@@ -93,7 +94,7 @@ class StoredResult:
     @property
     def surface_config(self) -> SurfaceConfig:
         """How the meshes were made."""
-        return SurfaceConfig(**self.record["config"]["surface"])
+        return _surface_config(self.record)
 
     def _surface(self, name: str, unit: str) -> Surface:
         mesh = _read_mesh(self.folder / name)
@@ -169,10 +170,8 @@ def _check(record: dict[str, Any]) -> None:
         if abs(np.linalg.norm(_numbers(plane["normal"], (3,))) - 1) > 1e-3:
             raise ValueError("the plane's normal is no unit vector")
         _numbers(plane["offset"], ())
-    for name, value in record["config"]["surface"].items():
-        if not _numbers(value, ()) > 0:
-            raise ValueError(f"surface {name} {value!r:.60}")
-    SurfaceConfig(**record["config"]["surface"])
+    if not 0 < _surface_config(record).level < 1:
+        raise ValueError("no surface has that level")
     ids = [item["id"] for item in record["objects"]]
     if not all(type(i) is int for i in ids) or len(set(ids)) < len(ids):
         raise ValueError(f"ids {ids[:10]}")
@@ -184,6 +183,17 @@ def _check(record: dict[str, Any]) -> None:
             if item["mesh"] != mesh_name(item["id"]):
                 raise ValueError(f"mesh {item['mesh']!r}")
             _text(item["uncertainty_unit"])
+
+
+def _surface_config(record: dict[str, Any]) -> SurfaceConfig:
+    """Errors: KeyError, TypeError, ValueError."""
+    table = record["config"]["surface"]
+    if not isinstance(table, dict):
+        raise TypeError(f"surface {table!r:.60}")
+    try:
+        return changed(SurfaceConfig(), table, RECORD, "config.surface.")
+    except ConfigError as error:
+        raise ValueError(f"{error.where} is {error.found}") from error
 
 
 def _numbers(value: Any, shape: tuple[int, ...]) -> NDArray[np.float64]:

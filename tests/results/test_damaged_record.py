@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +13,7 @@ from click.testing import CliRunner
 
 from brrp_cli.api import open_result
 from brrp_cli.cli import main
+from brrp_cli.config import PRESETS, PointSDFConfig, VPrismConfig
 from brrp_cli.errors import ResultError
 
 RECORD = {
@@ -83,6 +85,16 @@ def test_any_value_in_any_place_is_refused_or_harmless(place, tmp_path: Path) ->
         assert len(set(stored.object_ids)) == len(stored.object_ids)
         for item in stored.record["objects"]:
             assert item["mesh"] in (None, f"object_{item['id']}.ply")
+
+
+@pytest.mark.parametrize(
+    "config",
+    [*PRESETS.values(), VPrismConfig(), PointSDFConfig()],
+    ids=[*PRESETS, "vprism", "pointsdf"],
+)
+def test_the_surface_of_every_configuration_is_read_as_it_was_written(config, tmp_path) -> None:
+    record = changed(("config",), {"surface": asdict(config.surface)})
+    assert open_result(written(tmp_path, json.dumps(record))).surface_config == config.surface
 
 
 @pytest.mark.parametrize("text", ["", "null", "[" * 100_000, '{"schema": 1}', "{" + "9" * 500])
