@@ -16,6 +16,7 @@ from brrp_cli.config.observation import ObservationConfig, SensorConfig
 from brrp_cli.config.registration import (
     ColourConfig,
     FeatureConfig,
+    RayRefinementConfig,
     RegistrationConfig,
     SearchConfig,
     VerificationConfig,
@@ -38,6 +39,7 @@ __all__ = [
     "MeanConfig",
     "ObservationConfig",
     "PointSDFConfig",
+    "RayRefinementConfig",
     "RegistrationConfig",
     "RetrievalConfig",
     "SearchConfig",
@@ -55,6 +57,7 @@ class HypothesesConfig:
     """What takes the place of the scale scan and of the fixed grid of hinge points."""
 
     search: SearchConfig = field(default_factory=SearchConfig)
+    refine: RayRefinementConfig = field(default_factory=RayRefinementConfig)
     weigh: WeighConfig = field(default_factory=WeighConfig)
     mean: MeanConfig = field(default_factory=MeanConfig)
     completion: CompletionConfig = field(default_factory=CompletionConfig)

@@ -134,6 +134,30 @@ class SearchConfig:
 
 
 @dataclass(frozen=True)
+class RayRefinementConfig:
+    """The last step of a placement, by casting the rays of `points` observed points into the mesh.
+
+    `steps` steps of Gauss-Newton at most, fewer where one turns and moves by less than `still`.
+    Residuals beyond `outlier` standard deviations do not pull; of the others a share `independent`
+    counts, since neighbouring pixels err together. turn, shift : radians and metres by which a
+    placement is off before that step; standing : metres, standard deviation of the height at which
+    an object stands on the plane
+    most_shift, most_turn : a motion beyond is none of a last step, and is not made
+    """
+
+    points: int = 1000
+    steps: int = 12
+    still: float = 2e-5
+    outlier: float = 3.0
+    independent: float = share(0.05)
+    turn: float = 0.05
+    shift: float = 0.002
+    standing: float = 0.0007
+    most_shift: float = 0.01
+    most_turn: float = 0.2
+
+
+@dataclass(frozen=True)
 class WeighConfig:
     """Weights of hypotheses: P(c|R) exp(sharpness * alignment score).
 

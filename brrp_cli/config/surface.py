@@ -17,6 +17,8 @@ class SurfaceConfig:
     moved further, and where no stored object explains what is seen, the surface comes from marching
     cubes on a grid of about `nodes` nodes, whose spacing in metres lies between `finest` and
     `spacing`.
+    around_nodes : of the grid on which the confidence surface around a stored mesh is found, whose
+    spacing is `around_finest` metres at least
     fidelity : metres, standard deviation of a stored mesh from its object
     keep_distance : metres; a component of the level set further from every observed point is
     hallucinated
@@ -48,4 +50,6 @@ class SurfaceConfig:
     wall_share: float = share(0.4)
     steps: int = 17
     fidelity: float = 0.0002
+    around_nodes: int = 1_000_000
+    around_finest: float = 0.001
     most_off: float = share(0.05)

@@ -26,6 +26,7 @@ from brrp_cli.reconstruction import OK, ObjectReconstruction, Retrieved
 from brrp_cli.registration.model import search_model
 from brrp_cli.registration.pose_covariance import pose_covariance
 from brrp_cli.registration.pose_search import Hypothesis, search
+from brrp_cli.registration.ray_refinement import refine_by_rays
 from brrp_cli.registration.scale_scan import observed_cloud
 from brrp_cli.registration.verification import Verifier
 from brrp_cli.retrieval.base import Retriever, top_k, unknown
@@ -84,8 +85,19 @@ def reconstruct_by_hypotheses(
         weights = weigh(
             shares, [each.alignment_score for each in placed], missing, hypotheses.weigh
         )
+        kept = _kept(weights, hypotheses.map)
+        for i in kept[kept < len(placed)]:
+            placed[i] = _refined(placed[i], verifier, wave, hypotheses)
         posterior = _infer(
-            observation, frame, plane, wave, placed, weights, hypotheses, seed=seed, device=device
+            observation,
+            frame,
+            plane,
+            wave,
+            [placed[i] for i in kept if i < len(placed)],
+            weights[kept] / weights[kept].sum(),
+            hypotheses,
+            seed=seed,
+            device=device,
         )
     ends = np.cumsum([0, *(len(group) for group in found)])
     return ObjectReconstruction(
@@ -95,10 +107,8 @@ def reconstruct_by_hypotheses(
         center=observation.center,
         observed=observation.points,
         retrieved=[
-            _retrieved(name, probability, group, float(weights[a:b].sum()))
-            for (name, probability), group, a, b in zip(
-                chosen, found, ends[:-1], ends[1:], strict=True
-            )
+            _retrieved(name, probability, placed[a:b], float(weights[a:b].sum()))
+            for (name, probability), a, b in zip(chosen, ends[:-1], ends[1:], strict=True)
         ],
         unknown_probability=missing,
         unknown_weight=float(weights[-1]),
@@ -139,14 +149,10 @@ def _infer(
     seed: int,
     device: str,
 ) -> HypothesisPosterior:
-    """Only hypotheses that weigh something cost a mean function."""
-    kept = _kept(weights, config.map)
-    weights = weights[kept] / weights[kept].sum()
-    shapes = [
-        _placed_shape(placed[i], observation.points, wave, config) for i in kept if i < len(placed)
-    ]
+    """weights : of what was placed and, where there is one more, of "none of them"."""
+    shapes = [_placed_shape(each, observation.points, wave, config) for each in placed]
     part = None
-    if len(shapes) < len(kept):
+    if len(shapes) < len(weights):
         part = visible_part(
             observation.points, frame, observation.object_id, plane, config.completion
         )
@@ -176,6 +182,24 @@ def _kept(weights: Array, config: FittedMapConfig) -> NDArray[np.int64]:
     than particles, in their order."""
     order = np.argsort(-weights, kind="stable")[: config.particles]
     return np.sort(order[(weights[order] >= config.least_weight) | (np.arange(len(order)) == 0)])
+
+
+def _refined(
+    hypothesis: Hypothesis, verifier: Verifier, wave: float, config: HypothesesConfig
+) -> Hypothesis:
+    """Placed by the rays of what was seen, in the end; its score stays."""
+    T_cam_object = refine_by_rays(
+        hypothesis.T_cam_object,
+        hypothesis.model.stored.shape,
+        verifier.points,
+        float(verifier.frame.K[0, 0]),
+        verifier.plane,
+        wave,
+        config.sensor,
+        config.refine,
+    )
+    T_cam_model = T_cam_object @ np.linalg.inv(hypothesis.model.T_model_object)
+    return replace(hypothesis, T_cam_model=T_cam_model)
 
 
 def _placed_shape(

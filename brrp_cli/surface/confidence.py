@@ -38,6 +38,7 @@ from brrp_cli.config import SurfaceConfig
 from brrp_cli.inference.hypothesis_posterior import HypothesisPosterior
 from brrp_cli.inference.particles import particle_shares, particle_volumes
 from brrp_cli.reconstruction import Axes, OccupancyPosterior
+from brrp_cli.surface.around_mesh import around_axes, beyond_reach, marching_cubes_of
 from brrp_cli.surface.extract import grid_axes, level_set
 from brrp_cli.surface.stored_mesh import along_normals, moved_to_level, placed
 
@@ -131,8 +132,8 @@ def _around_stored_mesh(
     margin: float,
     empty: Empty | None,
 ) -> ConfidenceSurface | None:
-    """The same along the normals of a recognised object's mesh, which no grid makes coarser; None
-    where the frame contradicts the stored shape."""
+    """The same around a recognised object's mesh; None where the frame contradicts the stored
+    shape."""
     through = along_normals(posterior, number, config)
     best = moved_to_level(through, config.level, through.own)
     if best.off > config.most_off:
@@ -141,22 +142,34 @@ def _around_stored_mesh(
     # All placements that are as probable, at once (Scheffe's band): the pose has six unknowns.
     by_pose = np.sqrt(chi2.ppf(confidence, 6)) * shape.deviations
     band = np.hypot(by_pose, norm.ppf((1 + confidence) / 2) * config.fidelity)
+    moved = np.einsum("ni,ni->n", best.vertices - through.vertices, through.normals)
     # Where a vertex is a corner, its faces move by less than itself.
-    vertices = best.vertices + (band * shape.shape.corners)[:, None] * through.normals
+    reach = moved + band * shape.shape.corners
+    axes = around_axes(shape, float(reach.max()) + margin, config)
+    beyond = beyond_reach(shape, reach, axes, margin)
+    if margin > 0:
+        beyond = _less_margin(beyond, axes, margin, empty)
+    inside: NDArray[np.floating] = -beyond
     if posterior.object_weight(number) < confidence:
         # The object may be something else altogether.
         level = confidence_level(through.particles, confidence, posterior.shares)
         if level is None:
             return None
-        other = moved_to_level(through, min(level, config.level)).vertices
-        outer = np.einsum("ni,ni->n", other - vertices, through.normals) > 0
-        vertices = np.where(outer[:, None], other, vertices)
-    if margin > 0:
-        grown = vertices + margin * through.normals
-        may_grow = np.ones(len(grown), dtype=bool) if empty is None else ~empty(grown)
-        vertices = np.where(may_grow[:, None], grown, vertices)
-    faces = shape.shape.faces.astype(np.int64)
-    return ConfidenceSurface(vertices, faces, confidence, 1 - confidence, bounded=True)
+        occupied = posterior.probability_volume(axes) / min(level, config.level) - 1
+        inside = np.maximum(inside, occupied * (axes[0][1] - axes[0][0]))
+    found = marching_cubes_of(inside, axes)
+    return ConfidenceSurface(*found, confidence, 1 - confidence, bounded=True)
+
+
+def _less_margin(
+    beyond: NDArray[np.float64], axes: Axes, margin: float, empty: Empty | None
+) -> NDArray[np.float64]:
+    """Metres beyond a region that is wider by `margin` where it was not seen to be `empty`."""
+    may_grow = (beyond > 0) & (beyond < 2 * margin)
+    if empty is not None:
+        nodes = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1, dtype=np.float64)
+        may_grow[may_grow] = ~empty(nodes[may_grow])
+    return np.where(may_grow, beyond - margin, beyond)
 
 
 def _at_edge(region: NDArray[np.bool_]) -> bool:

@@ -53,7 +53,12 @@ def ell() -> trimesh.Trimesh:
     )
 
 
-MESHES = {"box": box, "ell": ell}
+def beaker() -> trimesh.Trimesh:
+    """Its walls are thinner than the nodes of a stored field are apart."""
+    return solids.beaker(0.035, 0.04, 0.09, 0.002)
+
+
+MESHES = {"box": box, "ell": ell, "beaker": beaker}
 
 
 @cache

@@ -1,0 +1,67 @@
+"""The region within a given reach of a placed mesh.
+
+A mesh whose vertices are moved along their normals runs into itself where it is thin or hollow, and
+leaves out there what it should hold. The region is taken from signed distances instead.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brrp_cli.config import SurfaceConfig
+from brrp_cli.dependencies import import_open3d
+from brrp_cli.geometry import transform_points
+from brrp_cli.inference.placed_shape import PlacedShape
+from brrp_cli.reconstruction import Axes
+
+Array = NDArray[np.float64]
+
+
+def around_axes(shape: PlacedShape, reach: float, config: SurfaceConfig) -> Axes:
+    """Axes, metres, camera frame, of a grid that holds the shape and `reach` metres around it."""
+    low, high = shape.bounds
+    size = high - low + 2 * max(reach, 0.0)
+    spacing = max(float((np.prod(size) / config.around_nodes) ** (1 / 3)), config.around_finest)
+    edge = max(reach, 0.0) + 2 * spacing
+    x, y, z = (
+        np.arange(a - edge, b + edge + spacing, spacing) for a, b in zip(low, high, strict=True)
+    )
+    return x, y, z
+
+
+def beyond_reach(shape: PlacedShape, reach: Array, axes: Axes, further: float) -> Array:
+    """Metres (nx, ny, nz) by which the nodes of a grid lie beyond the reach of the shape's surface,
+    negative within it; right from 0 to `further` metres and of the right sign elsewhere.
+
+    reach : (n,) metres by which the region goes beyond each vertex, outwards; that of a face is the
+    largest of its corners
+    """
+    o3d = import_open3d()
+    nodes = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
+    spacing = float(axes[0][1] - axes[0][0])
+    band = max(float(np.abs(reach).max()), 0.0) + further + 2 * spacing
+    distance = shape.signed_distance(nodes, band)
+    beyond = np.where(distance < 0, -spacing, distance)
+    near = np.flatnonzero(np.abs(distance) < band)
+    local = transform_points(np.linalg.inv(shape.T_cam_shape), nodes[near])
+    query = o3d.core.Tensor(np.ascontiguousarray(local, dtype=np.float32))
+    face = shape.shape.scene.compute_closest_points(query, nthreads=1)["primitive_ids"].numpy()
+    corners = shape.shape.faces[face.astype(np.int64)]
+    beyond[near] = distance[near] - reach[corners].max(axis=1)
+    return np.asarray(beyond.reshape([len(axis) for axis in axes]))
+
+
+def marching_cubes_of(inside: NDArray[np.floating], axes: Axes) -> tuple[Array, NDArray[np.int64]]:
+    """Vertices (n, 3), metres, and faces (m, 3) of the closed, outward surface of {inside > 0},
+    where `inside` (nx, ny, nz) is given at the nodes of a grid."""
+    from skimage.measure import marching_cubes
+
+    spacing = float(axes[0][1] - axes[0][0])
+    # A node on the surface itself is a surface without volume, or none at all.
+    least = 1e-3 * spacing
+    volume = np.where(np.abs(inside) < least, least, inside)
+    volume = np.pad(volume, 1, constant_values=-spacing)
+    vertices, faces, _, _ = marching_cubes(volume, 0.0, gradient_direction="ascent")
+    origin = np.array([axis[0] for axis in axes])
+    return (vertices.astype(np.float64) - 1) * spacing + origin, faces.astype(np.int64)
