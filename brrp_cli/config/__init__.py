@@ -16,6 +16,7 @@ from brrp_cli.config.observation import ObservationConfig, SensorConfig
 from brrp_cli.config.registration import (
     ColourConfig,
     FeatureConfig,
+    LikelihoodConfig,
     RegistrationConfig,
     SearchConfig,
     VerificationConfig,
@@ -35,6 +36,7 @@ __all__ = [
     "FittedMapConfig",
     "HypothesesConfig",
     "InferenceConfig",
+    "LikelihoodConfig",
     "MeanConfig",
     "ObservationConfig",
     "PointSDFConfig",
@@ -55,6 +57,7 @@ class HypothesesConfig:
     """What takes the place of the scale scan and of the fixed grid of hinge points."""
 
     search: SearchConfig = field(default_factory=SearchConfig)
+    likelihood: LikelihoodConfig = field(default_factory=LikelihoodConfig)
     weigh: WeighConfig = field(default_factory=WeighConfig)
     mean: MeanConfig = field(default_factory=MeanConfig)
     completion: CompletionConfig = field(default_factory=CompletionConfig)

@@ -53,7 +53,12 @@ def ell() -> trimesh.Trimesh:
     )
 
 
-MESHES = {"box": box, "ell": ell}
+def ball() -> trimesh.Trimesh:
+    """Radius 5 cm, on the table."""
+    return solids.moved(trimesh.creation.icosphere(subdivisions=4, radius=0.05), z=0.05)
+
+
+MESHES = {"box": box, "ell": ell, "ball": ball}
 
 
 @cache
