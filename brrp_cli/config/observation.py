@@ -49,9 +49,10 @@ class SensorConfig:
     fine_window : pixels over which a pixel's own noise is averaged
     jump : metres between neighbouring pixels, which is no noise; bleed : radians over which sensors
     mix the two sides of one
+    table_margin : radians from what is not the table in which its waves are not looked for
     wave_window : metres; what is smooth over more is taken along by a placement
-    least_correlation : of two patches that counts; patches_per_vote : patches that err as one where
-    no table tells
+    least_correlation : of two patches that counts; untold_wave : metres, of patches 1 metre away,
+    and patches_per_vote : that err as one, where no table tells
     sure : standard deviations in front of the measured depth from which on space is free for
     certain
     """
@@ -69,7 +70,9 @@ class SensorConfig:
     fine_window: int = 7
     jump: float = 0.02
     bleed: float = 0.0042
+    table_margin: float = 0.01
     wave_window: float = 0.12
     least_correlation: float = share(0.1)
+    untold_wave: float = 0.002
     patches_per_vote: float = 10.0
     sure: float = 3.0

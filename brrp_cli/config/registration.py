@@ -156,10 +156,10 @@ class LikelihoodConfig:
 
     rays_across_patch: float = 3.0
     least_share: float = share(0.3)
-    misfit: float = 0.0006
+    misfit: float = 0.0005
     reach: float = 0.03
     strays: float = share(0.1)
-    other_shape: float = 0.0034
+    other_shape: float = 0.0033
     other_strays: float = share(0.28)
     free: float = 0.008
     on_table: float = 0.005
@@ -167,11 +167,11 @@ class LikelihoodConfig:
     slope: float = 0.012
     surface_points: int = 600
     depth: float = 1.1
-    missed: float = 4.6
-    covered: float = 0.24
+    missed: float = 4.7
+    covered: float = 0.27
     free_space: float = 3.0
-    below: float = 5.8
-    colour: float = 4.5
+    below: float = 6.0
+    colour: float = 4.4
     most_votes: float = 13.0
     base: float = between(1.6, -50.0, 50.0)
     other_size: float = 3.6

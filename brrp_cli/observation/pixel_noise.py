@@ -48,7 +48,7 @@ def pixel_noise(frame: Frame, plane: Plane | None, config: SensorConfig) -> Pixe
     unknown = ~np.isfinite(fine)
     fine[unknown] = depth_deviation(np.nan_to_num(depth[unknown], nan=1.0), config)
     found = None if plane is None else _table_waves(frame, plane, config)
-    wave, at, patches = found or (config.wave, 1.0, config.patches_per_vote)
+    wave, at, patches = found or (config.untold_wave, 1.0, config.patches_per_vote)
     return PixelNoise(fine.astype(np.float32), _at_jumps(depth, frame.K, config), wave, at, patches)
 
 
@@ -85,12 +85,14 @@ def _table_waves(
 ) -> tuple[float, float, float] | None:
     """Standard deviation of patches' mean depth, metres, the table's depth, metres, and patches in
     a vote; None where too little of the table is seen."""
-    from scipy.ndimage import uniform_filter
+    from scipy.ndimage import binary_erosion, uniform_filter
 
-    points = frame.points[frame.valid & (frame.segmap == BACKGROUND)].astype(np.float64)
-    height = plane.signed_distance(points)
-    near = np.abs(height) < config.table_reach
-    points, height = points[near], height[near]
+    height = plane.signed_distance(frame.points)
+    with np.errstate(invalid="ignore"):
+        table = (frame.segmap == BACKGROUND) & (np.abs(height) < config.table_reach)
+    # Feet of objects and the table's edge are no waves.
+    table = binary_erosion(table, iterations=max(1, round(config.table_margin * frame.K[0, 0])))
+    points, height = frame.points[table].astype(np.float64), height[table]
     along = np.abs(points @ plane.normal / np.linalg.norm(points, axis=1))
     cells = np.floor(points @ plane_frame(plane)[:2, :3].T / config.patch).astype(np.int64)
     if len(cells) < config.patch_points:

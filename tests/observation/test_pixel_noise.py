@@ -74,7 +74,10 @@ def test_jumps_of_depth_are_marked_and_no_more():
 
 def test_without_a_table_the_configuration_tells():
     noise = pixel_noise(disturbed(0.0005), None, CONFIG)
-    assert (noise.wave, noise.patches_per_vote) == (CONFIG.wave, CONFIG.patches_per_vote)
+    assert (noise.wave_at(1.0), noise.patches_per_vote) == (
+        CONFIG.untold_wave,
+        CONFIG.patches_per_vote,
+    )
 
 
 def test_pixels_without_depth_have_a_noise_too():
