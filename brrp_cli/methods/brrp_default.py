@@ -191,7 +191,7 @@ def _infer(
     samples = soft_samples(observation, frame, config.map.behind, config.sensor)
     noise = config.sensor.sure * depth_deviation(observation.center[2:], config.sensor)[0]
     return infer_correction(
-        Problem(samples, tuple(means), weights, stiffness, noise, box),
+        Problem(samples, tuple(means), weights, stiffness, noise, box, wave),
         config.map,
         seed=child_seed(seed, observation.object_id),
         device=device,
