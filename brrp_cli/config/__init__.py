@@ -16,6 +16,7 @@ from brrp_cli.config.observation import ObservationConfig, SensorConfig
 from brrp_cli.config.registration import (
     ColourConfig,
     FeatureConfig,
+    LikelihoodConfig,
     RayRefinementConfig,
     RegistrationConfig,
     SearchConfig,
@@ -36,6 +37,7 @@ __all__ = [
     "FittedMapConfig",
     "HypothesesConfig",
     "InferenceConfig",
+    "LikelihoodConfig",
     "MeanConfig",
     "ObservationConfig",
     "PointSDFConfig",
@@ -58,6 +60,7 @@ class HypothesesConfig:
 
     search: SearchConfig = field(default_factory=SearchConfig)
     refine: RayRefinementConfig = field(default_factory=RayRefinementConfig)
+    likelihood: LikelihoodConfig = field(default_factory=LikelihoodConfig)
     weigh: WeighConfig = field(default_factory=WeighConfig)
     mean: MeanConfig = field(default_factory=MeanConfig)
     completion: CompletionConfig = field(default_factory=CompletionConfig)

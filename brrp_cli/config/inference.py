@@ -41,7 +41,7 @@ class MeanConfig:
     nodes: int = 200_000
     width: float = 0.0005
     sure: float = 0.9
-    doubt: float = 0.01
+    doubt: float = 0.004
     limit: float = 5.0
     beyond_doubt: float = 1.5
     shell: float = 0.004

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from brrp_cli.config.ranges import share
+
 
 @dataclass(frozen=True)
 class ObservationConfig:
@@ -44,6 +46,13 @@ class SensorConfig:
     bias : metres, standard deviation of what depth is off as a whole
     pose_turn, pose_shift : radians and metres by which a placement may be off before anything is
     seen
+    fine_window : pixels over which a pixel's own noise is averaged
+    jump : metres between neighbouring pixels, which is no noise; bleed : radians over which sensors
+    mix the two sides of one
+    table_margin : radians from what is not the table in which its waves are not looked for
+    wave_window : metres; what is smooth over more is taken along by a placement
+    least_correlation : of two patches that counts; untold_wave : metres, of patches 1 metre away,
+    and patches_per_vote : that err as one, where no table tells
     sure : standard deviations in front of the measured depth from which on space is free for
     certain
     """
@@ -58,4 +67,12 @@ class SensorConfig:
     patch_points: int = 8
     pose_turn: float = 0.05
     pose_shift: float = 0.005
+    fine_window: int = 7
+    jump: float = 0.02
+    bleed: float = 0.0042
+    table_margin: float = 0.01
+    wave_window: float = 0.12
+    least_correlation: float = share(0.1)
+    untold_wave: float = 0.002
+    patches_per_vote: float = 10.0
     sure: float = 3.0

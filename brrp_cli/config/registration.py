@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from brrp_cli.config.ranges import share
+from brrp_cli.config.ranges import between, share
 
 
 @dataclass(frozen=True)
@@ -86,11 +86,10 @@ class SearchConfig:
     refined with the pose: the best `rescaled` placements begin it at `sizes` times the true size,
     observed points pull from `size_distance` metres, and sizes whose logarithm is within
     `least_size_change` of 0 or beyond `most_size` are dropped. Its alignment score falls by
-    size_cost, which over `sharpness` (see WeighConfig) is the log odds against another size, and by
-    size_spread_cost * ln(size)^2. No other size is tried where the score reaches `settled`, and
-    nothing is refined further where none of the placements reaches `hopeless` or all stay `beaten`
-    behind another model's. Of placements whose surfaces lie within `distinct` metres the best is
-    kept, `kept` in all.
+    size_cost + size_spread_cost * ln(size)^2. No other size is tried where the score reaches
+    `settled`, and nothing is refined further where none of the placements reaches `hopeless` or all
+    stay `beaten` behind another model's. Of placements whose surfaces lie within `distinct` metres
+    the best is kept, `kept` in all.
     """
 
     turns: int = 24
@@ -158,16 +157,60 @@ class RayRefinementConfig:
 
 
 @dataclass(frozen=True)
-class WeighConfig:
-    """Weights of hypotheses: P(c|R) exp(sharpness * alignment score).
+class LikelihoodConfig:
+    """Log likelihood ratio of a placement against none of the stored objects
+    (registration/likelihood.py), nats.
 
-    The hypothesis that the object is none of the stored ones has the score
-    `unknown_score` and a probability within [least_unknown, most_unknown]; no hypothesis counts as
-    less probable than `least_share`, since a retriever may be wrong.
+    rays_across_patch : rays along the side of a patch (`SensorConfig.patch`); least_share : of its
+    rays that have to be compared
+    misfit : metres, standard deviation by which stored meshes and poses are off; reach : metres,
+    larger residuals count as this large; strays : share of patches that are off by anything within
+    `reach`; other_shape : metres, standard deviation by which another shape is off where it was
+    fitted, other_strays : and its strays
+    free : metres behind the rendered depth from which on a measured one says that it is not there;
+    on_table : metres, own pixels no higher may be the table's: none of them is missed
+    tolerance, slope : metres below the table from which model surface counts, and on which it comes
+    to count fully; surface_points : of the model that are asked
+    depth, missed, covered, free_space, below, colour : nats for a nat of depth residuals, a vote of
+    missed, covered or free pixels, all of the surface below the table, full correlation of colours
+    most_votes : that all votes can come to; base : nats of any placement
+    other_size : nats against a placement at another size than the stored one
+    within : placements whose alignment score is less than the best by more have no weight
     """
 
-    sharpness: float = 40.0
-    unknown_score: float = 0.7
+    rays_across_patch: float = 3.0
+    least_share: float = share(0.3)
+    misfit: float = 0.0005
+    reach: float = 0.03
+    strays: float = share(0.1)
+    other_shape: float = 0.0033
+    other_strays: float = share(0.28)
+    free: float = 0.008
+    on_table: float = 0.005
+    tolerance: float = 0.003
+    slope: float = 0.012
+    surface_points: int = 600
+    depth: float = 1.1
+    missed: float = 4.7
+    covered: float = 0.27
+    free_space: float = 3.0
+    below: float = 6.0
+    colour: float = 4.4
+    most_votes: float = 13.0
+    base: float = between(1.6, -50.0, 50.0)
+    other_size: float = 3.6
+    within: float = 0.5
+
+
+@dataclass(frozen=True)
+class WeighConfig:
+    """Weights of hypotheses: P(c|R) exp(log likelihood ratio).
+
+    The hypothesis that the object is none of the stored ones has a ratio of 1 and a probability
+    within [least_unknown, most_unknown]; no hypothesis counts as less probable than `least_share`,
+    since a retriever may be wrong.
+    """
+
     least_unknown: float = share(0.1)
     most_unknown: float = share(0.9)
     least_share: float = share(1e-3)

@@ -54,6 +54,8 @@ class HypothesisPosterior:
     means : m of C hypotheses; which : (P,) the hypothesis of each particle; shares : (P,), sum 1,
     the weight of each particle; correction : the particles' weights w; box : (2, 3) metres, camera
     frame, outside of which nothing is occupied
+    common : metres, standard deviation of what the depth that a completed shape was made of is off
+    over centimetres: no sample tells of it. A placed shape has it in its pose's covariance.
     """
 
     kind: ClassVar[str] = "hypotheses"
@@ -63,6 +65,7 @@ class HypothesisPosterior:
     shares: NDArray[np.float64]
     correction: HilbertPosterior
     box: NDArray[np.float64]
+    common: float = 0.0
 
     @property
     def bounds(self) -> NDArray[np.float64]:
@@ -139,19 +142,24 @@ class HypothesisPosterior:
     def surface_uncertainty(self, vertices: NDArray[np.floating]) -> NDArray[np.float32]:
         """Standard deviation (n,), metres, of the surface's place at its vertices (n, 3).
 
-        Occupancy falls from 1 to 0 across a surface: the more slowly, the less is known where.
+        Occupancy falls from 1 to 0 across a surface: the more slowly, the less is known where. What
+        the depth behind a completed shape has in `common` is added in squares.
         """
         gradient = [
             (self.probability(vertices + step) - self.probability(vertices - step)) / (2 * STEP)
             for step in np.eye(3) * STEP
         ]
-        return deviation(np.linalg.norm(gradient, axis=0))
+        placed = np.array([isinstance(mean, PlacedShape) for mean in self.means])
+        completed = float(self.weights[~placed].sum())
+        found = deviation(np.linalg.norm(gradient, axis=0))
+        return np.hypot(found, np.float32(self.common * np.sqrt(completed)))
 
     def write(self, group: h5py.Group, shared: SharedParts) -> None:
         """The correction as its class writes it, and which (P,) int64, shares (P,) float64, box (2,
         3), means/0, 1, ... as their classes write them, with their kind."""
         self.correction.write(group, shared)
         group.attrs["box"] = self.box
+        group.attrs["common"] = self.common
         for name, values in (("which", self.which), ("shares", self.shares)):
             group.create_dataset(name, data=values, chunks=values.shape, fletcher32=True)
         for number, mean in enumerate(self.means):
@@ -174,6 +182,7 @@ class HypothesisPosterior:
             shares,
             HilbertPosterior.read(group, shared),
             np.asarray(group.attrs["box"], dtype=np.float64),
+            float(group.attrs.get("common", 0.0)),
         )
 
 

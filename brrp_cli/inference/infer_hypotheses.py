@@ -38,7 +38,7 @@ class Problem:
     observed : samples near the object; means : of C hypotheses; weights : (C,), sum 1, of the
     hypotheses; stiffness : (C,) factors of lambda_norm; noise : metres, a placed shape whose
     surface lies so near to a measured point explains it; box : (2, 3), metres, camera frame, what
-    was seen and the hypotheses' shapes
+    was seen and the hypotheses' shapes; common : metres, what all of the depth is off alike
     """
 
     observed: SoftSamples
@@ -47,6 +47,7 @@ class Problem:
     stiffness: Array
     noise: float
     box: Array
+    common: float = 0.0
 
 
 def infer_correction(
@@ -91,7 +92,9 @@ def infer_correction(
     )
     reach = float((problem.box[1] - problem.box[0]).max() / 2)
     correction = HilbertPosterior(weights.cpu().numpy(), center, grid, reach)
-    return HypothesisPosterior(problem.means, which, shares, correction, problem.box)
+    return HypothesisPosterior(
+        problem.means, which, shares, correction, problem.box, problem.common
+    )
 
 
 def _counted(

@@ -24,6 +24,7 @@ def run(frame: Frame, setup: Setup) -> Reconstruction:
     from brrp_cli.methods.brrp_default import reconstruct_by_hypotheses
     from brrp_cli.methods.brrp_paper import reconstruct_object
     from brrp_cli.methods.each_object import too_few, with_surface
+    from brrp_cli.observation.pixel_noise import pixel_noise
     from brrp_cli.observation.ray_samples import observe
     from brrp_cli.observation.sensor_noise import wave_deviation
     from brrp_cli.progress import progress
@@ -38,9 +39,9 @@ def run(frame: Frame, setup: Setup) -> Reconstruction:
     workers = setup.workers or cores()
     start = time.perf_counter()
     scene = observe(frame, config.observation, seed, workers)
-    wave = 0.0
     if config.hypotheses is not None:
         wave = wave_deviation(frame, scene.plane, config.hypotheses.sensor)
+        noise = pixel_noise(frame, scene.plane, config.hypotheses.sensor)
     seconds = {"observation": time.perf_counter() - start}
 
     def one(observation: ObjectObservation) -> ObjectReconstruction:
@@ -52,6 +53,7 @@ def run(frame: Frame, setup: Setup) -> Reconstruction:
             frame,
             scene.plane,
             wave,
+            noise,
             observation,
             prior,
             retriever,

@@ -17,12 +17,14 @@ from brrp_cli.inference.infer_hypotheses import Problem, infer_correction
 from brrp_cli.inference.mean_grid import MeanGrid, grid_over
 from brrp_cli.inference.placed_shape import PlacedShape
 from brrp_cli.inference.posterior import LOGISTIC_DEVIATION
+from brrp_cli.observation.pixel_noise import PixelNoise
 from brrp_cli.observation.ray_samples import ObjectObservation
 from brrp_cli.observation.sensor_noise import depth_deviation
 from brrp_cli.observation.soft_samples import soft_samples
 from brrp_cli.observation.support_plane import Plane
 from brrp_cli.prior.store import Prior
 from brrp_cli.reconstruction import OK, ObjectReconstruction, Retrieved
+from brrp_cli.registration.likelihood import evidence, log_likelihood, see
 from brrp_cli.registration.model import search_model
 from brrp_cli.registration.pose_covariance import pose_covariance
 from brrp_cli.registration.pose_search import Hypothesis, search
@@ -40,6 +42,7 @@ def reconstruct_by_hypotheses(
     frame: Frame,
     plane: Plane | None,
     wave: float,
+    noise: PixelNoise,
     observation: ObjectObservation,
     prior: Prior,
     retriever: Retriever,
@@ -51,7 +54,8 @@ def reconstruct_by_hypotheses(
     """Posterior of one object from hypotheses about the k retrieved objects and from the one that
     it is none of them, each corrected by what was observed.
 
-    wave : metres, standard deviation of the mean depth of a patch (observation/sensor_noise.py)
+    wave : metres, standard deviation of the mean depth of a patch (observation/sensor_noise.py);
+    noise : of the frame's pixels
     """
     hypotheses = config.hypotheses
     assert hypotheses is not None
@@ -79,15 +83,14 @@ def reconstruct_by_hypotheses(
                     ),
                 )
             )
-    with timed(seconds, "inference"):
         placed = [each for group in found for each in group]
         shares = [p for (_, p), group in zip(chosen, found, strict=True) for _ in group]
-        weights = weigh(
-            shares, [each.alignment_score for each in placed], missing, hypotheses.weigh
-        )
+        ratios = _log_likelihoods(placed, frame, object_id, plane, noise, hypotheses)
+        weights = weigh(shares, ratios, missing, hypotheses.weigh)
         kept = _kept(weights, hypotheses.map)
         for i in kept[kept < len(placed)]:
             placed[i] = _refined(placed[i], verifier, wave, hypotheses)
+    with timed(seconds, "inference"):
         posterior = _infer(
             observation,
             frame,
@@ -117,22 +120,46 @@ def reconstruct_by_hypotheses(
     )
 
 
+def _log_likelihoods(
+    placed: list[Hypothesis],
+    frame: Frame,
+    object_id: int,
+    plane: Plane | None,
+    noise: PixelNoise,
+    config: HypothesesConfig,
+) -> list[float]:
+    """Of each placement, against that it is none of the stored objects, nats."""
+    likelihood, sensor = config.likelihood, config.sensor
+    seen = see(frame, object_id, plane, noise, sensor.patch, sensor.bleed, likelihood)
+    best = max((each.alignment_score for each in placed), default=-np.inf)
+    ratios = []
+    for each in placed:
+        ratio = -np.inf
+        if each.alignment_score >= best - likelihood.within:
+            found = evidence(each.T_cam_model, each.model, seen, likelihood, config.search.colour)
+            resized = abs(np.log(each.scale)) > config.search.least_size_change
+            ratio = log_likelihood(found, likelihood) - likelihood.other_size * resized
+        ratios.append(ratio)
+    return ratios
+
+
 def weigh(
-    shares: Sequence[float], alignment_score: Sequence[float], missing: float, config: WeighConfig
+    shares: Sequence[float], log_ratios: Sequence[float], missing: float, config: WeighConfig
 ) -> Array:
     """Weights (C + 1,), sum 1, of C hypotheses and, last, of the one that it is something else.
 
-    shares : P(c|R) of each hypothesis's object; missing : P(not in the prior | R).
+    shares : P(c|R) of each hypothesis's object; log_ratios : how much more probable each makes the
+    frame than the last one does, nats; missing : P(not in the prior | R).
     """
     none = float(np.clip(missing, config.least_unknown, config.most_unknown))
     known = np.asarray(shares, dtype=np.float64)
     # Ratios among the stored objects are the retriever's, how likely they are as a whole is not:
-    # alignment score that stands above all doubt outweighs a retriever that was wrong.
+    # a likelihood that is above all doubt outweighs a retriever that was wrong.
     if not known.any():
         known = np.ones_like(known)
     probability = np.append(known / (known.sum() or 1.0) * (1 - none), none)
-    scores = np.append(np.asarray(alignment_score, dtype=np.float64), config.unknown_score)
-    log = np.log(np.maximum(probability, config.least_share)) + config.sharpness * scores
+    ratios = np.append(np.asarray(log_ratios, dtype=np.float64), 0.0)
+    log = np.log(np.maximum(probability, config.least_share)) + ratios
     weights = np.exp(log - log.max())
     return np.asarray(weights / weights.sum())
 
@@ -170,7 +197,7 @@ def _infer(
     samples = soft_samples(observation, frame, config.map.behind, config.sensor)
     noise = config.sensor.sure * depth_deviation(observation.center[2:], config.sensor)[0]
     return infer_correction(
-        Problem(samples, tuple(means), weights, stiffness, noise, box),
+        Problem(samples, tuple(means), weights, stiffness, noise, box, wave),
         config.map,
         seed=child_seed(seed, observation.object_id),
         device=device,

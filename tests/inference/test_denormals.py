@@ -66,8 +66,10 @@ def test_brrp_makes_none(frame, prior, name):
     """Observation, pose search, means, hinge features, SVGD and the grid of the surface."""
     config = preset(name)
     if config.hypotheses is not None:
-        even = replace(config.hypotheses.weigh, sharpness=0.0)
-        config = replace(config, hypotheses=replace(config.hypotheses, weigh=even))
+        even = replace(
+            config.hypotheses.likelihood, most_votes=1e-9, below=0.0, colour=0.0, base=0.0
+        )
+        config = replace(config, hypotheses=replace(config.hypotheses, likelihood=even))
     else:
         config = replace(
             config,

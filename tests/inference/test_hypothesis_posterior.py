@@ -100,6 +100,20 @@ def test_two_hypotheses_apart_are_less_certain_than_one():
     assert two.uncertainty(middle)[0] > 0.2
 
 
+def test_what_depth_is_off_alike_is_added_to_completed_surfaces_in_squares(shapes):
+    sharp = posterior(ramp(0.001))
+    alone = sharp.surface_uncertainty(CENTER[None])
+    wavy = replace(sharp, common=0.003).surface_uncertainty(CENTER[None])
+    np.testing.assert_allclose(wavy, np.hypot(alone, 0.003), rtol=1e-5)
+    # A placement has it in its pose's covariance.
+    only = of_means([shapes[0]], shapes[0].bounds)
+    vertices = shapes[0].vertices[:20]
+    np.testing.assert_array_equal(
+        replace(only, common=0.003).surface_uncertainty(vertices),
+        only.surface_uncertainty(vertices),
+    )
+
+
 def test_where_nothing_says_where_the_surface_is_the_spread_is_the_largest():
     flat = posterior(lambda x: np.zeros_like(x))
     assert flat.surface_uncertainty(CENTER[None])[0] == pytest.approx(LARGEST)

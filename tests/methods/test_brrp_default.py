@@ -71,7 +71,7 @@ def test_stored_objects_are_reconstructed_as_they_are(result, truth, object_id):
 def test_the_record_tells_of_evidence_and_weights(result):
     for item, name in zip(result.objects, ("can", "box"), strict=True):
         assert item.retrieved[0].name == name
-        assert item.retrieved[0].alignment_score > CONFIG.hypotheses.weigh.unknown_score
+        assert item.retrieved[0].alignment_score > 0.7
         assert item.retrieved[0].weight > 0.9
         assert item.retrieved[1].alignment_score < item.retrieved[0].alignment_score
         weights = [r.weight for r in item.retrieved]

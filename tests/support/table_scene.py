@@ -58,7 +58,12 @@ def beaker() -> trimesh.Trimesh:
     return solids.beaker(0.035, 0.04, 0.09, 0.002)
 
 
-MESHES = {"box": box, "ell": ell, "beaker": beaker}
+def ball() -> trimesh.Trimesh:
+    """Radius 5 cm, on the table."""
+    return solids.moved(trimesh.creation.icosphere(subdivisions=4, radius=0.05), z=0.05)
+
+
+MESHES = {"box": box, "ell": ell, "ball": ball, "beaker": beaker}
 
 
 @cache
