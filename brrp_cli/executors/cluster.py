@@ -30,6 +30,8 @@ from brrp_cli.progress import note
 AHEAD = 2
 # Further tries of a task that failed for its machine's sake; as Dask's own for workers that died.
 RETRIES = 3
+# How long a worker of a local cluster may take to start again before another takes its place.
+RESTART = "60s"
 # Seconds: until a scheduler must have answered, between looks at how many workers there are, and
 # until it is said that there are none.
 CONNECT, LOOK, NO_WORKERS = 10.0, 2.0, 20.0
@@ -56,9 +58,11 @@ def open_cluster(scheduler: str) -> Iterator[Cluster]:
         stack.enter_context(_quiet_logs())
         local = _LOCAL.fullmatch(scheduler)
         if local:
-            client = stack.enter_context(_local(int(local[1])))
+            client, revive = stack.enter_context(_local(int(local[1])))
             title = f"{local[1]} Dask workers on this machine"
         else:
+            # Elsewhere Dask's nannies, or what started the cluster, replace workers.
+            revive = None
             address = _address(scheduler)
             try:
                 client = distributed.Client(address, timeout=CONNECT)
@@ -66,15 +70,19 @@ def open_cluster(scheduler: str) -> Iterator[Cluster]:
                 raise _no_answer(address, error) from error
             stack.callback(client.close, timeout=CONNECT)
             title = f"the Dask cluster {address}"
-        yield Cluster(client, title)
+        yield Cluster(client, title, revive)
 
 
 class Cluster:
-    """An executor on the workers of a Dask client."""
+    """An executor on the workers of a Dask client. revive : replaces workers that are gone, given
+    how many there are"""
 
-    def __init__(self, client: Any, title: str) -> None:
+    def __init__(
+        self, client: Any, title: str, revive: Callable[[int], None] | None = None
+    ) -> None:
         self.client = client
         self.title = title
+        self.revive = revive
 
     def run(
         self,
@@ -103,6 +111,8 @@ class Cluster:
             while todo or running:
                 with self._lost():
                     workers = crew.workers()
+                    if self.revive is not None:
+                        self.revive(len(workers))
                     while todo and len(running) < sum(workers.values()) + AHEAD:
                         index = todo.popleft()
                         failed = failed_on.get(index, [])
@@ -185,7 +195,7 @@ class _Crew:
         elif self._alone_since is None:
             self._alone_since = now
         elif now - self._alone_since > NO_WORKERS:
-            note(f"Waiting for workers: {self._title} has none")
+            note(f"No worker is there yet, waiting: {self._title}")
             self._alone_since = math.inf
 
 
@@ -221,23 +231,33 @@ def _result(future: Any, time_limit: float) -> Any:
 
 
 @contextmanager
-def _local(workers: int) -> Iterator[Any]:
-    """A client of `workers` workers with one thread each, started on this machine."""
+def _local(workers: int) -> Iterator[tuple[Any, Callable[[int], None]]]:
+    """A client of `workers` workers with one thread each, started on this machine, and what starts
+    others in place of those that are lost for good."""
+    import dask
     from distributed import Client, LocalCluster
 
-    try:
-        cluster = LocalCluster(
-            n_workers=workers,
-            threads_per_worker=1,
-            # A limit for each would kill what a process of its own may finish.
-            memory_limit=0,
-            dashboard_address=":0",
-            silence_logs=logging.CRITICAL,
-        )
-    except (OSError, RuntimeError, TimeoutError) as error:
-        raise cannot_start(error) from error
-    with cluster, Client(cluster) as client:
-        yield client
+    with ExitStack() as stack:
+        # A nanny starts its worker again at once. Dask gives the nanny up if that takes longer.
+        stack.enter_context(dask.config.set({"distributed.deploy.lost-worker-timeout": RESTART}))
+        try:
+            cluster = LocalCluster(
+                n_workers=workers,
+                threads_per_worker=1,
+                # A limit for each would kill what a process of its own may finish.
+                memory_limit=0,
+                dashboard_address=":0",
+                silence_logs=logging.CRITICAL,
+            )
+        except (OSError, RuntimeError, TimeoutError) as error:
+            raise cannot_start(error) from error
+        client = stack.enter_context(Client(stack.enter_context(cluster)))
+
+        def revive(there: int) -> None:
+            if there < workers:
+                cluster.scale(workers)
+
+        yield client, revive
 
 
 def _address(scheduler: str) -> str:

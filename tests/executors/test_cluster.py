@@ -26,6 +26,8 @@ def address() -> Iterator[str]:
     """Two workers; a task may cost one worker its life."""
     with (
         dask.config.set({"distributed.scheduler.allowed-failures": 1}),
+        # On a busy machine a worker takes long to come back.
+        dask.config.set({"distributed.deploy.lost-worker-timeout": "120s"}),
         LocalCluster(2, threads_per_worker=1, dashboard_address=":0", silence_logs=60) as started,
     ):
         yield started.scheduler_address
