@@ -23,7 +23,7 @@ from brrp_cli.prior.build.mesh_files import input_sha256
 from brrp_cli.prior.build.output_folder import refuse_foreign
 from brrp_cli.prior.build.reuse import Finished, Reusable, reusable_objects
 from brrp_cli.prior.build.shard_plan import plan_shards, shard_file
-from brrp_cli.prior.index import read_index
+from brrp_cli.prior.index import index_of, write_index
 from brrp_cli.prior.manifest import (
     FILE,
     Failure,
@@ -260,9 +260,10 @@ class Run:
     def commit(self, phrases: dict[str, str], before: Manifest | None) -> BuildReport:
         """Write the manifest of all that stands now, and delete what is no longer needed."""
         manifest = self._manifest(phrases, before)
-        write_manifest(self.out, manifest)
+        index = index_of(manifest, write_manifest(self.out, manifest))
         # Now, so that not the first to open the prior pays for it.
-        open_appearance_index(self.out, read_index(self.out), lambda: manifest)
+        write_index(self.out, index)
+        open_appearance_index(self.out, index, lambda: manifest)
         _sweep(self.out, manifest)
         names = {entry.name for entry in manifest.objects}
         return BuildReport(
