@@ -311,7 +311,9 @@ def _quiet_logs() -> Iterator[None]:
     if logging.getLogger("brrp_cli").isEnabledFor(logging.DEBUG):
         yield
         return
-    loggers = [logging.getLogger(name) for name in ("distributed", "tornado")]
+    # Dask gives levels to loggers of its parts, too.
+    parts = [name for name in logging.root.manager.loggerDict if name.startswith("distributed.")]
+    loggers = [logging.getLogger(name) for name in ("distributed", "tornado", *parts)]
     levels = [logger.level for logger in loggers]
     for logger in loggers:
         logger.setLevel(logging.CRITICAL + 1)
