@@ -106,6 +106,10 @@ class WeightsError(BrrpError):
     """A learned method's weights are missing, damaged, or of something else."""
 
 
+class ClusterError(BrrpError):
+    """Workers on other machines cannot be reached, or cannot do the work."""
+
+
 class FetchError(BrrpError):
     """A file cannot be fetched, or what came is not the file that was meant."""
 

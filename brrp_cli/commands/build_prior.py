@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from brrp_cli.commands.scheduler_option import scheduler_option
 from brrp_cli.commands.seed_option import SEED
 from brrp_cli.errors import BrrpError
 from brrp_cli.prior.locate import output_prior
@@ -39,6 +40,7 @@ if TYPE_CHECKING:
 @click.option(
     "--workers", type=click.IntRange(1), help="Processes; as many as processors if not said."
 )
+@scheduler_option
 @click.option(
     "--clip-dir",
     type=click.Path(path_type=Path),
@@ -53,6 +55,7 @@ def command(
     samples: int,
     seed: int,
     workers: int | None,
+    scheduler: str | None,
     clip_dir: Path | None,
     overwrite: bool,
 ) -> None:
@@ -66,6 +69,7 @@ def command(
     Example:
       brrp build-prior ycb/ household/ -o prior/
       brrp build-prior bop/models/ --units mm --descriptions names.csv
+      brrp build-prior meshes/ -o prior/ --scheduler tcp://10.0.0.1:8786
 
     Exit codes: 0 all meshes are in, 3 some failed, 1 none.
     """
@@ -79,6 +83,7 @@ def command(
         BuildParameters(seed=seed, units=units, samples=samples),
         descriptions=descriptions,
         workers=workers,
+        scheduler=scheduler,
         overwrite=overwrite,
         progress=not quiet(),
     )

@@ -18,6 +18,7 @@ from brrp_cli.commands.method_options import (
     weights_help,
 )
 from brrp_cli.commands.retriever_option import RetrieverName
+from brrp_cli.commands.scheduler_option import scheduler_option
 from brrp_cli.commands.seed_option import SEED
 from brrp_cli.methods.registry import COMPARED, METHODS, preset_names
 from brrp_cli.progress import note
@@ -119,6 +120,7 @@ def _selection(ctx: click.Context, option: click.Parameter, value: str | None) -
 @click.option("--noise", is_flag=True, help="Add the noise of a structured-light camera.")
 @click.option("--scenes", "selection", metavar="A:B", callback=_selection, help="Only these.")
 @click.option("--workers", type=click.IntRange(1), help="Processes of one thread. [default: cores]")
+@scheduler_option
 @click.option("--pictures", is_flag=True, help="Write a picture of each scene and variant.")
 @click.option("--seed", type=SEED, default=0, show_default=True)
 @click.option("--device", type=click.Choice(["auto", "cpu", "cuda"]), default="auto")
@@ -140,6 +142,7 @@ def command(
     noise: bool,
     selection: slice | None,
     workers: int | None,
+    scheduler: str | None,
     pictures: bool,
     seed: int,
     device: str,
@@ -183,6 +186,7 @@ def command(
         seed=seed,
         device=device,
         workers=workers,
+        scheduler=scheduler,
         pictures=pictures,
         overwrite=overwrite,
     )

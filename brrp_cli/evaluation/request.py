@@ -28,6 +28,7 @@ from brrp_cli.evaluation.summary import (
 )
 from brrp_cli.evaluation.variants import Variant, expand, same_results, short_labels
 from brrp_cli.evaluation.work import Plan
+from brrp_cli.executors.executor import open_executor
 from brrp_cli.files import sha256_file, write_bytes
 from brrp_cli.ground_truth.scenes import Scene, find_scenes
 from brrp_cli.ground_truth.true_meshes import truth_cache
@@ -38,7 +39,6 @@ from brrp_cli.progress import progress
 from brrp_cli.retrieval.choose import USE_CLIP, resolve_name
 from brrp_cli.retrieval.clip.model_files import clip_folder, need_clip_folder
 from brrp_cli.stop import stopped
-from brrp_cli.threads import cores
 from brrp_cli.version import __version__
 
 
@@ -63,6 +63,7 @@ class Request:
     seed: int = 0
     device: str = "auto"
     workers: int | None = None
+    scheduler: str | None = None
     pictures: bool = False
     overwrite: bool = False
 
@@ -82,7 +83,7 @@ def evaluate(request: Request, say: Callable[[str], None] = lambda text: None) -
 
     Errors: SceneError, PriorError, RetrievalError, WeightsError or MeshError before the work
     starts; OutputError if the folder holds a different run and `overwrite` is false; StoppedError
-    after Ctrl-C or SIGTERM.
+    after Ctrl-C or SIGTERM; ClusterError where the scheduler does not answer or is lost.
     """
     scenes = find_scenes(request.scenes, request.selection)
     opened = _prior(request)
@@ -113,7 +114,6 @@ def evaluate(request: Request, say: Callable[[str], None] = lambda text: None) -
     for variant in variants:
         if opened is not None and variant.k is not None and variant.k > len(opened.names):
             say(f"--k {variant.k}: the prior holds {len(opened.names)} objects, all are taken")
-    workers = request.workers or cores()
     labels = short_labels(variants)
     plan = Plan(
         scenes=scenes,
@@ -128,12 +128,15 @@ def evaluate(request: Request, say: Callable[[str], None] = lambda text: None) -
         pictures=request.output / "pictures" if request.pictures else None,
         weights=weights,
     )
-    with claimed(request.output, parameters, overwrite=request.overwrite) as path:
-        say(f"{len(scenes)} scenes, {workers} workers: {', '.join(labels.values())}")
+    with (
+        open_executor(request.workers, request.scheduler) as executor,
+        claimed(request.output, parameters, overwrite=request.overwrite) as path,
+    ):
+        say(f"{len(scenes)} scenes, {executor.title}: {', '.join(labels.values())}")
         log = RowLog(path)
         lost: dict[str, str] = {}
         todo = remaining(plan, log)
-        work = run_remaining(plan, log, todo, workers)
+        work = run_remaining(plan, log, todo, executor)
         try:
             for ended, error in progress(work, "true meshes, then scenes", len(todo)):
                 if error is not None and isinstance(ended, Scene):

@@ -12,7 +12,7 @@ from brrp_cli.evaluation.evaluate_scene import evaluate_scene
 from brrp_cli.evaluation.rows import Row, RowLog, finished, variant_columns, variant_of
 from brrp_cli.evaluation.variants import Variant, same_results
 from brrp_cli.evaluation.work import Plan, lost_row
-from brrp_cli.executors import run_tasks
+from brrp_cli.executors.executor import Executor
 from brrp_cli.ground_truth.scenes import Scene
 from brrp_cli.ground_truth.true_meshes import close_truth
 from brrp_cli.ground_truth.truth import TrueObject
@@ -50,7 +50,7 @@ def remaining(plan: Plan, log: RowLog) -> Remaining:
 
 
 def run_remaining(
-    plan: Plan, log: RowLog, todo: Remaining, workers: int
+    plan: Plan, log: RowLog, todo: Remaining, executor: Executor
 ) -> Generator[tuple[TrueObject | Scene, BrrpError | None], None, None]:
     """Do it: meshes first. Yields what has ended, with its error: a mesh that cannot be closed, a
     scene whose worker died. Errors: the first mesh's, if not one of them can be closed.
@@ -60,7 +60,10 @@ def run_remaining(
     tasks: list[tuple[Any, ...]] = [(shared, each) for each in todo.meshes]
     tasks += [(shared, scene, variants, log.path) for scene, variants in todo.scenes]
     unusable = []
-    for index, result in run_tasks(_work, tasks, min(workers, len(tasks)), TIME_LIMIT):
+    reads = [*dict.fromkeys(scene.folder.parent for scene in plan.scenes), plan.data_root]
+    reads += [path for path in (plan.prior, *plan.weights.values()) if path is not None]
+    results = executor.run(_work, tasks, TIME_LIMIT, reads=reads, writes=log.path.parent)
+    for index, result in results:
         error = result if isinstance(result, BrrpError) else None
         if index >= len(todo.meshes):
             yield todo.scenes[index - len(todo.meshes)][0], error

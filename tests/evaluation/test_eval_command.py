@@ -198,9 +198,28 @@ def test_bare_the_report_lies_beside_the_scenes_and_shifts_are_compared(place):
     assert (folder / "plots" / "iou_shift.png").is_file()
 
 
+def retrieve(place, output, *options):
+    """Retrieval alone, by appearance and by chance."""
+    chosen = ["--method", "retrieval", "--retriever", "appearance,uniform"]
+    return run(place, *chosen, "--prior", place / "prior", "-o", output, *options)
+
+
+def test_a_cluster_gives_the_same_rows(place, monkeypatch):
+    monkeypatch.chdir(place)
+    assert retrieve(place, "by_processes", "--workers", "2").exit_code == 0
+    result = retrieve(place, "by_dask", "--scheduler", "local:2")
+    assert result.exit_code == 0, result.output
+    rows = without_cost(rows_of(place / "by_dask"))
+    assert len(rows) == 6
+    assert rows == without_cost(rows_of(place / "by_processes"))
+    names = [
+        {path.name for path in (place / each).iterdir()} for each in ("by_dask", "by_processes")
+    ]
+    assert names[0] == names[1]
+
+
 def test_retrieval_alone_is_measured(place):
-    options = ["--method", "retrieval", "--retriever", "appearance,uniform", "--workers", "1"]
-    result = run(place, *options, "--prior", place / "prior", "-o", place / "retrieval")
+    result = retrieve(place, place / "retrieval", "--workers", "1")
     assert result.exit_code == 0, result.output
     assert "retrieval appearance" in result.output and "among 3 1.000" in result.output
     rows = rows_of(place / "retrieval")

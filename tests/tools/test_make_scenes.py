@@ -42,6 +42,22 @@ def data(tmp_path_factory):
     return root
 
 
+def test_plain_colours_of_faces_are_drawn(tmp_path):
+    box = trimesh.creation.box((0.1, 0.1, 0.1))
+    box.visual.face_colors = [[255, 0, 0, 255]] * 6 + [[0, 0, 255, 255]] * 6
+    box.export(tmp_path / "two.ply")
+    box.export(tmp_path / "none.stl")
+    model = load_model(tmp_path / "two.ply")
+    texture = np.asarray(model.texture)
+    columns = (model.uv[model.faces][..., 0] * texture.shape[1]).astype(int)
+    drawn = texture[texture.shape[0] // 2, columns]
+    assert (drawn == drawn[:, :1]).all()
+    assert sorted(map(tuple, drawn[:, 0])) == [(0, 0, 255)] * 6 + [(255, 0, 0)] * 6
+    # The same faces with the same normals, each with corners of its own.
+    assert np.allclose(model.vertices[model.faces], box.triangles, atol=1e-6)
+    assert load_model(tmp_path / "none.stl").uv is None
+
+
 def generate(data, output, *options):
     arguments = ["--meshes", data / "meshes", "--size", SIZE, "-o", output, *options]
     return CliRunner().invoke(main, [str(a) for a in arguments])

@@ -16,6 +16,7 @@ from brrp_cli.errors import MeshError
 SUFFIXES = {".obj", ".ply", ".stl", ".off", ".glb"}
 MAX_VERTICES = 131_072  # of one shape in PyBullet
 TEXTURE_SIZE = 1024
+MAX_COLOURS, SQUARE = 512, 8  # plain colours of a mesh; pixels of each in its texture
 DENSITY = 400.0  # kg/m3; between an empty box and a full can
 
 
@@ -88,6 +89,8 @@ def load_model(path: Path) -> Model:
             fix="decimate it",
         )
     uv, texture = _texture(mesh)
+    if uv is None and (painted := _plain_colours(path)) is not None:
+        mesh, uv, texture = painted
     return Model(
         vertices=np.array(mesh.vertices, dtype=np.float64),
         normals=np.array(mesh.vertex_normals, dtype=np.float64),
@@ -113,3 +116,29 @@ def _texture(mesh: Any) -> tuple[NDArray[np.float64] | None, Any]:
     return np.array(uv, dtype=np.float64), image.convert("RGB").resize(
         (side, side), Image.Resampling.BOX
     )
+
+
+def _plain_colours(path: Path) -> tuple[Any, NDArray[np.float64], Any] | None:
+    """The mesh with corners of their own for each face, their uv, and a texture with a square for
+    each colour, of a file whose faces have plain colours; None for a file without."""
+    import trimesh
+    from PIL import Image
+
+    from brrp_cli.prior.build.coloured_mesh import load_painted
+
+    parts = load_painted(path).parts
+    if any(paint.corners is None for _, paint in parts):
+        return None
+    colours = np.concatenate([paint.corners.mean(axis=1) for _, paint in parts])
+    palette, which = np.unique(np.rint(colours).astype(np.uint8), axis=0, return_inverse=True)
+    corners = np.concatenate([part.triangles.reshape(-1, 3) for part, _ in parts])
+    if len(palette) > MAX_COLOURS or len(corners) > MAX_VERTICES:
+        return None
+    normals = np.concatenate([part.vertex_normals[part.faces].reshape(-1, 3) for part, _ in parts])
+    mesh = trimesh.Trimesh(
+        corners, np.arange(len(corners)).reshape(-1, 3), vertex_normals=normals, process=False
+    )
+    squares = np.repeat(np.repeat(palette[None], SQUARE, axis=0), SQUARE, axis=1)
+    across = (np.repeat(which.ravel(), 3) + 0.5) / len(palette)
+    uv = np.stack([across, np.full(len(across), 0.5)], axis=1)
+    return mesh, uv, Image.fromarray(squares)

@@ -86,7 +86,7 @@ def perspective(size: tuple[int, int]) -> NDArray[np.float64]:
 
 
 def draw_look(count: int, rng: np.random.Generator) -> Look:
-    """Random colours for `count` objects (used where a mesh has no texture), table and light."""
+    """Random colours for `count` objects (used where a mesh has no colours), table and light."""
     import colorsys
 
     colors = [

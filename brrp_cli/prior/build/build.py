@@ -10,8 +10,8 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from brrp_cli.errors import BrrpError, DependencyError, MeshError, PriorError
-from brrp_cli.executors import run_tasks
+from brrp_cli.errors import BrrpError, ClusterError, DependencyError, MeshError, PriorError
+from brrp_cli.executors.executor import Executor, open_executor
 from brrp_cli.files import atomic_path, sha256_file
 from brrp_cli.prior.appearance_file import Rows, is_whole, sidecar_file, write_sidecar
 from brrp_cli.prior.appearance_index import open_appearance_index
@@ -23,7 +23,7 @@ from brrp_cli.prior.build.mesh_files import input_sha256
 from brrp_cli.prior.build.output_folder import refuse_foreign
 from brrp_cli.prior.build.reuse import Finished, Reusable, reusable_objects
 from brrp_cli.prior.build.shard_plan import plan_shards, shard_file
-from brrp_cli.prior.index import read_index
+from brrp_cli.prior.index import index_of, write_index
 from brrp_cli.prior.manifest import (
     FILE,
     Failure,
@@ -38,7 +38,6 @@ from brrp_cli.prior.pack import pack
 from brrp_cli.prior.parameters import BuildParameters, refuse_differences
 from brrp_cli.prior.shard import StoredObject, damaged, open_shard, read_stored, write_shard
 from brrp_cli.stop import sigterm_raises, stopped
-from brrp_cli.threads import cores
 
 # No mesh that ever gets done takes this long; pymeshlab can loop for ever on some.
 TIME_LIMIT = 900.0
@@ -64,6 +63,7 @@ def build_prior(
     *,
     descriptions: Path | None = None,
     workers: int | None = None,
+    scheduler: str | None = None,
     overwrite: bool = False,
     time_limit: float = TIME_LIMIT,
     progress: bool = False,
@@ -74,7 +74,8 @@ def build_prior(
     the build was interrupted. Errors: MeshError when there are no meshes or all of them fail;
     PriorError when the prior there has other parameters (and not `overwrite`) or another build is
     at work on it; StoppedError after Ctrl-C or SIGTERM, which keeps what is finished; OutputError,
-    also for a folder of other files; BrrpError where worker processes do not start.
+    also for a folder of other files; those of `open_executor`, to which `workers` and `scheduler`
+    go; BrrpError where worker processes do not start.
     """
     refuse_foreign(out)
     table = (parameters or BuildParameters()).as_dict()
@@ -87,8 +88,9 @@ def build_prior(
         if before is not None and not overwrite:
             refuse_differences(before.parameters, table, out)
         run = Run(out, table, sources, reusable_objects(out, before, table))
-        run.hash_inputs()
-        run.make(parameters or BuildParameters(), workers or cores(), time_limit, progress)
+        with open_executor(workers, scheduler) as executor:
+            run.hash_inputs()
+            run.make(parameters or BuildParameters(), executor, time_limit, progress, reads=places)
         if not run.done:
             raise MeshError(
                 "None of the meshes became an object",
@@ -145,9 +147,18 @@ class Run:
                 self.failed[name] = _reason(error, source)
 
     def make(
-        self, parameters: BuildParameters, workers: int, time_limit: float, progress: bool
+        self,
+        parameters: BuildParameters,
+        executor: Executor,
+        time_limit: float = TIME_LIMIT,
+        progress: bool = False,
+        *,
+        reads: Sequence[Path] = (),
     ) -> None:
-        """Make what is not in stock; write each shard when the last of its members is there."""
+        """Make what is not in stock; write each shard when the last of its members is there.
+
+        reads : files and folders of the meshes
+        """
         from tqdm import tqdm
 
         groups = plan_shards(list(self.hashes))
@@ -158,7 +169,7 @@ class Run:
             if not left[id(group)]:
                 self._write(group)
         tasks = [(self.sources[name], self.hashes[name], parameters) for name in todo]
-        results = run_tasks(make_stored, tasks, min(workers, len(todo)), time_limit)
+        results = executor.run(make_stored, tasks, time_limit, reads=reads)
         try:
             for index, result in tqdm(
                 results, total=len(todo), desc="objects", disable=not progress or not todo
@@ -168,10 +179,12 @@ class Run:
                 left[id(group)] -= 1
                 if not left[id(group)]:
                     self._write(group)
-        except KeyboardInterrupt as stop:
+        except (KeyboardInterrupt, ClusterError) as stop:
             for group in groups:
                 if self.waiting.keys() & set(group):
                     self._write(group)
+            if isinstance(stop, ClusterError):
+                raise
             raise stopped(
                 stop,
                 where=self.out,
@@ -247,9 +260,10 @@ class Run:
     def commit(self, phrases: dict[str, str], before: Manifest | None) -> BuildReport:
         """Write the manifest of all that stands now, and delete what is no longer needed."""
         manifest = self._manifest(phrases, before)
-        write_manifest(self.out, manifest)
+        index = index_of(manifest, write_manifest(self.out, manifest))
         # Now, so that not the first to open the prior pays for it.
-        open_appearance_index(self.out, read_index(self.out), lambda: manifest)
+        write_index(self.out, index)
+        open_appearance_index(self.out, index, lambda: manifest)
         _sweep(self.out, manifest)
         names = {entry.name for entry in manifest.objects}
         return BuildReport(

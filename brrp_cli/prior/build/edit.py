@@ -10,6 +10,7 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from brrp_cli.errors import MeshError, PriorError
+from brrp_cli.executors.processes import Processes
 from brrp_cli.nearest import nearest
 from brrp_cli.prior.appearance_file import kept_rows
 from brrp_cli.prior.build.build import (
@@ -59,7 +60,7 @@ def add_objects(
         listed = {shard.file for shard in before.shards}
         for key, finished in unlisted_objects(prior, listed, before.parameters).items():
             run.stock.setdefault(key, finished)
-        run.make(parameters, workers or cores(), time_limit, progress)
+        run.make(parameters, Processes(workers or cores()), time_limit, progress)
         return run.commit(phrases, before)
 
 
@@ -81,7 +82,7 @@ def remove_objects(prior: Path, names: Iterable[str]) -> BuildReport:
         run = _run(prior, before, kept)
         for name in gone:
             run.failed_before.pop(name, None)
-        run.make(restore_parameters(before.parameters, prior / FILE), 1, TIME_LIMIT, False)
+        run.make(restore_parameters(before.parameters, prior / FILE), Processes(1))
         return run.commit({}, before)
 
 
@@ -126,7 +127,7 @@ def merge_priors(priors: Sequence[Path], out: Path, *, overwrite: bool = False) 
         for key, finished in unlisted_objects(out, listed, first.parameters).items():
             if key in run.stock and run.stock[key].record == finished.record:
                 run.stock[key] = finished
-        run.make(restore_parameters(first.parameters, folders[0] / FILE), 1, TIME_LIMIT, False)
+        run.make(restore_parameters(first.parameters, folders[0] / FILE), Processes(1))
         return run.commit({}, before)
 
 

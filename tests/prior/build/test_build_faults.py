@@ -34,7 +34,7 @@ from small_prior import prior_bytes
 
 from brrp_cli.config import FeatureConfig
 from brrp_cli.errors import BrrpError, OutputError
-from brrp_cli.prior.build import build
+from brrp_cli.executors.processes import Processes
 from brrp_cli.prior.build.build import build_prior, make_stored
 from brrp_cli.prior.build.shard_plan import plan_shards
 from brrp_cli.prior.manifest import FILE
@@ -74,7 +74,11 @@ def made_once() -> Any:
     known: dict[tuple[str, str], Any] = {}
 
     def at_hand(
-        function: Callable[..., Any], tasks: list[tuple[Any, ...]], workers: int, limit: float
+        self: Processes,
+        function: Callable[..., Any],
+        tasks: list[tuple[Any, ...]],
+        limit: float,
+        **shared: object,
     ) -> Any:
         assert function is make_stored
         for index, (source, sha256, parameters) in enumerate(tasks):
@@ -86,7 +90,7 @@ def made_once() -> Any:
             yield index, known[source.name, sha256]
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(build, "run_tasks", at_hand)
+        patch.setattr(Processes, "run", at_hand)
         yield
 
 

@@ -41,7 +41,7 @@ if __name__ == "__main__":
 
     @click.command("build")
     def command():
-        build_prior(Path(sys.argv[2]), Path(sys.argv[3]), TINY, workers=2)
+        build_prior(Path(sys.argv[2]), Path(sys.argv[3]), TINY, **{workers!r})
 
     LazyGroup.get_command = lambda self, ctx, name: command
     sys.argv[1:] = ["build", *sys.argv[1:]]
@@ -62,13 +62,22 @@ def boxes(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def script(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return written_script(tmp_path_factory, {"workers": 2})
+
+
+@pytest.fixture(scope="module")
+def dask_script(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return written_script(tmp_path_factory, {"scheduler": "local:2"})
+
+
+def written_script(tmp_path_factory: pytest.TempPathFactory, workers: dict[str, object]) -> Path:
     path = tmp_path_factory.mktemp("script") / "build_it.py"
     paths = [
         str(Path(brrp_cli.__file__).parents[1]),
         str(Path(__file__).parent),
         str(Path(__file__).parents[2] / "support"),
     ]
-    path.write_text(SCRIPT.format(paths=paths))
+    path.write_text(SCRIPT.format(paths=paths, workers=workers))
     return path
 
 
@@ -115,16 +124,19 @@ def wait_for_a_shard(process: subprocess.Popen[str], out: Path) -> None:
 
 @pytest.mark.parametrize(("sent", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
 @pytest.mark.parametrize("group", [False, True], ids=["process", "group"])
+@pytest.mark.parametrize("where", ["script", "dask_script"])
 def test_a_signal_ends_the_build_with_its_code_and_keeps_what_is_finished(
     sent: signal.Signals,
     code: int,
     group: bool,
-    script: Path,
+    where: str,
+    request: pytest.FixtureRequest,
     boxes: Path,
     wanted: dict[str, bytes],
     tmp_path: Path,
 ) -> None:
     """Ctrl-C, and service managers, signal the workers too."""
+    script = request.getfixturevalue(where)
     assert len(plan_shards(NAMES)) == 3
     out = tmp_path / "prior"
     with start(script, boxes, out) as process:

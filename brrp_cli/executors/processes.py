@@ -13,6 +13,7 @@ from collections.abc import Callable, Generator, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, TimeoutError, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
+from pathlib import Path
 from typing import Any
 
 from brrp_cli.errors import BrrpError, unexpected
@@ -22,24 +23,35 @@ PATIENCE = 5.0
 # Seconds without a task at work after which it is asked whether processes start at all, and what
 # one that does nothing may take.
 _START, _PROBE = 10.0, 60.0
-_ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
 
-def run_tasks(
-    function: Callable[..., Any], tasks: Sequence[tuple[Any, ...]], workers: int, time_limit: float
-) -> Generator[tuple[int, Any], None, None]:
-    """Yield (index, result) as tasks end; a failed task's result is the exception.
+class Processes:
+    """An executor of so many processes on this machine."""
 
-    function : importable by name; called with each task's values in a process with one thread.
-    time_limit : seconds for one task. No more than `workers` tasks are out at a time, so that
-    results that nobody has taken yet do not pile up. Errors: BrrpError where no process starts.
-    """
-    try:
-        yield from _results(function, tasks, workers, time_limit)
-    except OSError as error:
-        # The system's own words for no more processes, or for no semaphores. A BrokenPipeError,
-        # of a helper of multiprocessing that died, would end a command without a word.
-        raise cannot_start(error) from error
+    def __init__(self, workers: int) -> None:
+        self.workers = workers
+        self.title = f"{workers} workers"
+
+    def run(
+        self,
+        function: Callable[..., Any],
+        tasks: Sequence[tuple[Any, ...]],
+        time_limit: float,
+        *,
+        reads: Sequence[Path] = (),
+        writes: Path | None = None,
+    ) -> Generator[tuple[int, Any], None, None]:
+        """As `Executor.run`. No more than `workers` tasks are out at a time."""
+        if not tasks:
+            return
+        try:
+            yield from _results(function, tasks, min(self.workers, len(tasks)), time_limit)
+        except OSError as error:
+            # The system's own words for no more processes, or for no semaphores. A
+            # BrokenPipeError, of a helper of multiprocessing that died, would end a command
+            # without a word.
+            raise cannot_start(error) from error
 
 
 def _results(
@@ -142,8 +154,8 @@ def _result(future: Future[Any], time_limit: float) -> Any:
 @contextmanager
 def _one_thread() -> Iterator[None]:
     """Numerical libraries read these variables when they are loaded, in the new process."""
-    before = {name: os.environ.get(name) for name in _ONE_THREAD}
-    os.environ.update(dict.fromkeys(_ONE_THREAD, "1"))
+    before = {name: os.environ.get(name) for name in ONE_THREAD}
+    os.environ.update(dict.fromkeys(ONE_THREAD, "1"))
     try:
         yield
     finally:

@@ -9,9 +9,9 @@ from pathlib import Path
 
 import pytest
 
-from brrp_cli import executors
 from brrp_cli.errors import BrrpError, MeshError
-from brrp_cli.executors import run_tasks
+from brrp_cli.executors import processes
+from brrp_cli.executors.processes import Processes
 
 
 def act(what: str) -> str:
@@ -30,7 +30,7 @@ def act(what: str) -> str:
 
 def test_each_task_ends_alone_whatever_becomes_of_it() -> None:
     tasks = [(what,) for what in ("a", "die", "refuse", "b", "hang", "stumble", "threads", "c")]
-    results = dict(run_tasks(act, tasks, workers=2, time_limit=5.0))
+    results = dict(Processes(2).run(act, tasks, 5.0))
     assert sorted(results) == list(range(8))
     assert [results[i] for i in (0, 3, 6, 7)] == ["A", "B", "1", "C"]
     assert "SIGSEGV" in str(results[1])
@@ -48,13 +48,13 @@ def promise(path: Path) -> None:
 
 def test_workers_with_nothing_to_do_end_by_themselves(tmp_path: Path) -> None:
     paths = [tmp_path / "a", tmp_path / "b"]
-    assert len(list(run_tasks(promise, [(path,) for path in paths], 2, 60.0))) == 2
+    assert len(list(Processes(2).run(promise, [(path,) for path in paths], 60.0))) == 2
     assert all(path.exists() for path in paths)
 
 
 def test_closing_early_leaves_no_process() -> None:
     before = dict(os.environ)
-    results = run_tasks(act, [("a",), ("hang",)], workers=2, time_limit=60.0)
+    results = Processes(2).run(act, [("a",), ("hang",)], 60.0)
     assert next(results) == (0, "A")
     assert multiprocessing.active_children()
     results.close()
@@ -63,7 +63,7 @@ def test_closing_early_leaves_no_process() -> None:
 
 
 def test_a_worker_that_is_killed_while_it_has_nothing_to_do_costs_no_task() -> None:
-    results = run_tasks(act, [("a",), ("b",), ("c",)], workers=1, time_limit=60.0)
+    results = Processes(1).run(act, [("a",), ("b",), ("c",)], 60.0)
     assert next(results) == (0, "A")
     for child in multiprocessing.active_children():
         child.kill()
@@ -74,12 +74,12 @@ def test_a_worker_that_is_killed_while_it_has_nothing_to_do_costs_no_task() -> N
 
 @pytest.mark.parametrize("program", ["/bin/false", "/no/such/python"])
 def test_processes_that_do_not_start_are_told(program, monkeypatch) -> None:
-    monkeypatch.setattr(executors, "_START", 1.0)
+    monkeypatch.setattr(processes, "_START", 1.0)
     before = multiprocessing.spawn.get_executable()
     multiprocessing.set_executable(program)
     try:
         with pytest.raises(BrrpError, match="Worker processes cannot start") as told:
-            list(run_tasks(act, [("a",), ("b",)], workers=2, time_limit=60.0))
+            list(Processes(2).run(act, [("a",), ("b",)], 60.0))
     finally:
         multiprocessing.set_executable(before)
     assert "exit code" in str(told.value.found)
@@ -92,4 +92,4 @@ def test_a_machine_without_semaphores_is_told(monkeypatch) -> None:
 
     monkeypatch.setattr(multiprocessing.synchronize._multiprocessing, "SemLock", refuse)
     with pytest.raises(BrrpError, match="Worker processes cannot start"):
-        list(run_tasks(act, [("a",)], workers=1, time_limit=60.0))
+        list(Processes(1).run(act, [("a",)], 60.0))
