@@ -45,7 +45,7 @@ def test_the_colour_scale_hides_nothing_of_the_scene(unit):
     segmap = np.zeros((120, 160), int)
     segmap[40:80, 60:100] = 1
     frame = make_frame(
-        np.zeros((120, 160, 3), np.uint8), segmap, depth=np.full((120, 160), 1.0), K=K
+        rgb=np.zeros((120, 160, 3), np.uint8), segmap=segmap, depth=np.full((120, 160), 1.0), K=K
     )
     mesh = trimesh.creation.box((4.0, 4.0, 0.1))
     mesh.apply_translation([0, 0, 1.05])
