@@ -31,6 +31,7 @@ class Told:
     weight : of that in the posterior, or the probability of what was retrieved
     size_factor : of a recognised object, over its stored size
     uncertainty : mean over the mesh, metres; None in other units
+    failed : whether it has no mesh
     """
 
     object_id: int
@@ -43,6 +44,7 @@ class Told:
     uncertainty: float | None
     seconds: float
     warnings: tuple[str, ...]
+    failed: bool
 
     def record(self) -> dict[str, Any]:
         """For --json; metres."""
@@ -80,6 +82,7 @@ def _told(item: ObjectReconstruction, frame: Frame) -> Told:
         uncertainty=float(surface.uncertainty.mean()) if surface and in_metres else None,
         seconds=sum(item.seconds.values()),
         warnings=tuple(_warnings(item, frame)),
+        failed=surface is None,
     )
 
 

@@ -11,7 +11,7 @@ import click
 from brrp_cli.commands.frame import refuse_existing, tell
 from brrp_cli.commands.method_options import CONFIG_HELP
 from brrp_cli.commands.seed_option import SEED
-from brrp_cli.commands.source_options import SourceOptions, source_options
+from brrp_cli.commands.source_options import SourceOptions, require_output, source_options
 
 if TYPE_CHECKING:
     from brrp_cli.frames.frame import Frame
@@ -51,7 +51,7 @@ def _splits(
 @click.option("--drop", "drops", multiple=True, callback=_ids, metavar="ID", help="Forget them.")
 @click.option("--config", "file", type=click.Path(path_type=Path), help=CONFIG_HELP)
 @click.option("--seed", type=SEED, default=0, show_default=True)
-@click.option("-o", "--output", type=click.Path(path_type=Path), required=True, help="FRAME.npz")
+@click.option("-o", "--output", type=click.Path(path_type=Path), help="FRAME.npz")
 @click.option("--overwrite", is_flag=True, help="Replace what stands at the output.")
 def command(
     source: SourceOptions,
@@ -61,7 +61,7 @@ def command(
     drops: list[list[int]],
     file: Path | None,
     seed: int,
-    output: Path,
+    output: Path | None,
     overwrite: bool,
 ) -> None:
     """Make masks, show them, and correct them by the ids that the picture shows.
@@ -77,6 +77,7 @@ def command(
       brrp segment scene/ --prompt "small object" -o frame.npz
     """
     source.check()
+    output = require_output(output)
     if output.suffix != ".npz":
         raise click.UsageError(f"-o must end in .npz, not {output.name!r}")
     if any(len(ids) < 2 for ids in merges):
