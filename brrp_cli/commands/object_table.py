@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 import numpy as np
 
-from brrp_cli.reconstruction import METRES, OK
+from brrp_cli.reconstruction import OK
 
 if TYPE_CHECKING:
     from brrp_cli.frames.frame import Frame
@@ -26,10 +26,7 @@ _RIGHT = ("id", "weight", "size", "± mm", "s")
 class Told:
     """What is told of one object.
 
-    taken_for : the stored object, None = none of them or nothing known; how : "recognised", "not in
-    the prior", "retrieved" (a method that weighs no placements) or "" (one without a prior)
-    weight : of that in the posterior, or the probability of what was retrieved
-    size_factor : of a recognised object, over its stored size
+    taken_for, how, weight, size_factor : as of `Outcome`
     uncertainty : mean over the mesh, metres; None in other units
     failed : whether it has no mesh
     """
@@ -68,37 +65,20 @@ def told(result: Reconstruction) -> list[Told]:
 
 
 def _told(item: ObjectReconstruction, frame: Frame) -> Told:
-    name, how, weight, size = _outcome(item)
-    surface = item.surface
-    in_metres = surface is not None and surface.uncertainty_unit == METRES
+    outcome = item.outcome
     return Told(
         object_id=item.object_id,
         status=item.status,
         message=item.message,
-        taken_for=name,
-        how=how,
-        weight=weight,
-        size_factor=size,
-        uncertainty=float(surface.uncertainty.mean()) if surface and in_metres else None,
+        taken_for=outcome.name,
+        how=outcome.how,
+        weight=outcome.weight,
+        size_factor=outcome.size_factor,
+        uncertainty=item.mean_uncertainty,
         seconds=sum(item.seconds.values()),
         warnings=tuple(_warnings(item, frame)),
-        failed=surface is None,
+        failed=item.surface is None,
     )
-
-
-def _outcome(
-    item: ObjectReconstruction,
-) -> tuple[str | None, str, float | None, float | None]:
-    """`taken_for`, `how`, `weight` and `size_factor` of `Told`."""
-    found = item.recognised
-    if found is not None:
-        return found.name, "recognised", found.weight, found.size_factor
-    if item.unknown_weight is not None:
-        return None, "not in the prior", item.unknown_weight, None
-    if item.retrieved:
-        best = item.retrieved[0]
-        return best.name, "retrieved", best.probability, None
-    return None, "", None, None
 
 
 def _warnings(item: ObjectReconstruction, frame: Frame) -> list[str]:

@@ -34,6 +34,7 @@ SCHEMA = 1
 RECORD = "result.json"
 FRAME = "frame.npz"
 POSTERIOR = "posterior.h5"
+PREVIEW = "preview.png"
 # Metres; vertices are single precision, which has steps of a tenth of a millimetre there.
 FARTHEST_ORIGIN = 1000.0
 LIBRARIES = ("torch", "open3d", "numpy", "scipy", "scikit-image", "trimesh", "h5py", "onnxruntime")
@@ -69,7 +70,7 @@ def write_results(
         )
         up = None if result.plane is None else result.plane.normal
         picture = preview(result.frame, result.objects, up=up, caption=caption)
-        Image.fromarray(picture).save(partial / "preview.png")
+        Image.fromarray(picture).save(partial / PREVIEW)
         names = sorted(path.name for path in partial.iterdir())
     return [Path(folder) / name for name in names]
 
