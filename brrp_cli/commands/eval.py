@@ -18,7 +18,8 @@ from brrp_cli.commands.method_options import (
     weights_help,
 )
 from brrp_cli.commands.retriever_option import RetrieverName
-from brrp_cli.commands.seed_option import SEED
+from brrp_cli.commands.seed_option import SEED, SEED_HELP, device_option
+from brrp_cli.errors import SceneError
 from brrp_cli.methods.registry import COMPARED, METHODS, preset_names
 from brrp_cli.progress import note
 from brrp_cli.retrieval.choose import RETRIEVERS
@@ -53,7 +54,12 @@ def _selection(ctx: click.Context, option: click.Parameter, value: str | None) -
 @click.command("eval")
 @click.argument("scenes", type=click.Path(path_type=Path))
 @click.option("--prior", "prior_path", type=click.Path(path_type=Path), help="The prior to use.")
-@click.option("-o", "--output", type=click.Path(path_type=Path), help="[default: SCENES_eval/]")
+@click.option(
+    "-o",
+    "--output",
+    type=click.Path(path_type=Path),
+    help="Folder to write. [default: SCENES_eval/]",
+)
 @click.option(
     "--data-root",
     type=click.Path(path_type=Path),
@@ -78,7 +84,7 @@ def _selection(ctx: click.Context, option: click.Parameter, value: str | None) -
     "presets",
     multiple=True,
     callback=_several(OneOf(preset_names)),
-    help=f"Of {', '.join(preset_names())}. [default: each method's first]",
+    help=f"Named configurations: {', '.join(preset_names())}. [default: each method's first]",
 )
 @click.option(
     "--config",
@@ -120,8 +126,8 @@ def _selection(ctx: click.Context, option: click.Parameter, value: str | None) -
 @click.option("--scenes", "selection", metavar="A:B", callback=_selection, help="Only these.")
 @click.option("--workers", type=click.IntRange(1), help="Processes of one thread. [default: cores]")
 @click.option("--pictures", is_flag=True, help="Write a picture of each scene and variant.")
-@click.option("--seed", type=SEED, default=0, show_default=True)
-@click.option("--device", type=click.Choice(["auto", "cpu", "cuda"]), default="auto")
+@click.option("--seed", type=SEED, default=0, show_default=True, help=SEED_HELP)
+@device_option
 @json_option
 @click.option("--overwrite", is_flag=True, help="Start anew where another run's rows are.")
 def command(
@@ -161,6 +167,9 @@ def command(
 
     Exit codes: 0 all objects have a result, 3 some failed.
     """
+    if not scenes.exists():  # told before what takes long to import
+        raise SceneError("No such folder of scenes", where=scenes, fix="check the path")
+
     from brrp_cli.evaluation.request import Request, evaluate
     from brrp_cli.evaluation.summary import as_record
 

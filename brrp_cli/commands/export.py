@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from brrp_cli.commands.seed_option import SEED
+from brrp_cli.commands.results_folder import require_results
+from brrp_cli.commands.seed_option import SEED, SEED_HELP
 from brrp_cli.planning.options import DENSITY, PlanOptions
 from brrp_cli.planning.parts import COACD, HOW, check_available
 from brrp_cli.progress import note
@@ -23,7 +24,9 @@ CONFIDENCE = click.FloatRange(0.5, 0.999)
 
 @click.command("export")
 @click.argument("results", metavar="OUT/", type=click.Path(path_type=Path))
-@click.option("-o", "--output", type=click.Path(path_type=Path), help="[default: OUT/plan]")
+@click.option(
+    "-o", "--output", type=click.Path(path_type=Path), help="Folder to write. [default: OUT/plan]"
+)
 @click.option(
     "--collision",
     type=click.Choice(HOW),
@@ -51,7 +54,7 @@ CONFIDENCE = click.FloatRange(0.5, 0.999)
     show_default=True,
     help="kg / m^3 of solid objects, for mass and inertia.",
 )
-@click.option("--seed", type=SEED, default=0, show_default=True)
+@click.option("--seed", type=SEED, default=0, show_default=True, help=SEED_HELP)
 @click.option("--overwrite", is_flag=True, help="Replace the output folder if it is there.")
 def command(
     results: Path,
@@ -74,10 +77,12 @@ def command(
       brrp export out/ --collision hull
       brrp export out/ --confidence 0.95 -o plan/
     """
-    from brrp_cli.api import open_result
-
     if margin and confidence is None:
         raise click.UsageError("--margin grows the shapes of --confidence, so give both")
+    require_results(results)
+
+    from brrp_cli.api import open_result
+
     check_available(collision)
     options = PlanOptions(collision, confidence, margin / 1000, density, seed)
     export(open_result(results), output, options, overwrite=overwrite)

@@ -118,7 +118,9 @@ def remove(names: tuple[str, ...], prior: Path | None) -> None:
 
 @command.command("merge")
 @click.argument("priors", type=click.Path(path_type=Path), nargs=-1, required=True)
-@click.option("-o", "--out", type=click.Path(path_type=Path), required=True, help="Folder to fill.")
+@click.option(
+    "-o", "--output", "out", type=click.Path(path_type=Path), required=True, help="Folder to fill."
+)
 @click.option("--overwrite", is_flag=True, help="Replace another prior that is there.")
 @clip_option
 def merge(priors: tuple[Path, ...], out: Path, overwrite: bool, clip_dir: Path | None) -> None:
@@ -162,7 +164,8 @@ def list_objects(prior: Path | None) -> None:
 @prior_option
 @click.option(
     "-o",
-    "--out",
+    "--output",
+    "out",
     type=click.Path(path_type=Path, dir_okay=False),
     help="PNG to write: the object in its colours, in its most probable resting pose.",
 )

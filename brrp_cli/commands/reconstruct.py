@@ -24,7 +24,7 @@ from brrp_cli.commands.method_options import (
 )
 from brrp_cli.commands.object_table import Told, lines, told
 from brrp_cli.commands.retriever_option import RetrieverName
-from brrp_cli.commands.seed_option import SEED
+from brrp_cli.commands.seed_option import SEED, SEED_HELP, device_option
 from brrp_cli.commands.source_options import SourceOptions, source_options
 from brrp_cli.commands.view import PAGE, title, view
 from brrp_cli.files import atomic_path
@@ -57,7 +57,12 @@ NO_COLLISION = "none"
     " OUT/FRAME/; those that are there are left.",
 )
 @click.option("--prior", "prior_path", type=click.Path(path_type=Path), help="The prior to use.")
-@click.option("-o", "--output", type=click.Path(path_type=Path), help="[default: SOURCE_METHOD/]")
+@click.option(
+    "-o",
+    "--output",
+    type=click.Path(path_type=Path),
+    help="Folder to write. [default: SOURCE_METHOD/]",
+)
 @click.option(
     "--method",
     type=OneOf(reconstructing),
@@ -90,9 +95,16 @@ NO_COLLISION = "none"
     type=click.Path(path_type=Path),
     help=f"Folder with CLIP ViT-B/16 as ONNX. [default: {CLIP_DIR_VARIABLE}, else the fetched]",
 )
-@click.option("--frame", "coordinates", type=click.Choice(["camera", "world"]), default="camera")
-@click.option("--seed", type=SEED, default=0, show_default=True)
-@click.option("--device", type=click.Choice(["auto", "cpu", "cuda"]), default="auto")
+@click.option(
+    "--frame",
+    "coordinates",
+    type=click.Choice(["camera", "world"]),
+    default="camera",
+    show_default=True,
+    help="Coordinates of the meshes; world needs the camera's pose (--camera-pose).",
+)
+@click.option("--seed", type=SEED, default=0, show_default=True, help=SEED_HELP)
+@device_option
 @click.option("--workers", type=click.IntRange(1), help="Objects at a time. [default: cores]")
 @click.option(
     "--collision",
@@ -160,6 +172,9 @@ def command(
       brrp reconstruct frame.npz --prior prior/ --poses bop
       brrp reconstruct recording.bag --frames 0:300:30 --prior prior/ -o out/
     """
+    source.check()
+    check_weights([method], [] if weights is None else [weights])
+
     from brrp_cli.api import open_result, reconstruct
     from brrp_cli.config.segmentation import SegmentConfig
     from brrp_cli.methods.config_file import read_config
@@ -167,8 +182,6 @@ def command(
     from brrp_cli.results.bop import bop_csv
     from brrp_cli.results.write import check_output, write_results
 
-    source.check()
-    check_weights([method], [] if weights is None else [weights])
     check_collision(collision, confidence)
     chosen = METHODS[method]
     check_options(chosen, preset_name, device)

@@ -10,7 +10,7 @@ import click
 
 from brrp_cli.commands.frame import refuse_existing, tell
 from brrp_cli.commands.method_options import CONFIG_HELP
-from brrp_cli.commands.seed_option import SEED
+from brrp_cli.commands.seed_option import SEED, SEED_HELP
 from brrp_cli.commands.source_options import SourceOptions, require_output, source_options
 
 if TYPE_CHECKING:
@@ -50,7 +50,7 @@ def _splits(
 )
 @click.option("--drop", "drops", multiple=True, callback=_ids, metavar="ID", help="Forget them.")
 @click.option("--config", "file", type=click.Path(path_type=Path), help=CONFIG_HELP)
-@click.option("--seed", type=SEED, default=0, show_default=True)
+@click.option("--seed", type=SEED, default=0, show_default=True, help=SEED_HELP)
 @click.option("-o", "--output", type=click.Path(path_type=Path), help="FRAME.npz")
 @click.option("--overwrite", is_flag=True, help="Replace what stands at the output.")
 def command(

@@ -10,6 +10,9 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from brrp_cli.errors import FrameError
+from brrp_cli.files import exists
+
 if TYPE_CHECKING:
     from brrp_cli.config.segmentation import SegmentConfig
     from brrp_cli.frames.format import Request
@@ -113,6 +116,10 @@ class SourceOptions:
             raise click.UsageError("--masks and --prompt exclude each other")
         if self.masks_dir is not None and self.prompt is None:
             raise click.UsageError("--masks-dir goes with --prompt")
+        for path in (self.path, self.color, self.depth, self.intrinsics, self.masks):
+            # Told before what takes long to import.
+            if path is not None and not exists(path):
+                raise FrameError("No such file or folder", where=path, fix="check the path")
 
     @property
     def name(self) -> Path:

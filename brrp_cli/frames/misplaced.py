@@ -16,6 +16,9 @@ _WHAT = {
 }
 
 
+FEW = 64  # different values: depth of a table has more
+
+
 def looks_like(array: NDArray[Any]) -> str | None:
     """The argument of `make_frame` that an array would be right for; None where none is clear."""
     if array.shape == (3, 3):
@@ -41,10 +44,13 @@ def advice(name: str, array: NDArray[Any]) -> str | None:
 
 def swapped(depth: ArrayLike, segmap: ArrayLike, most: int) -> bool:
     """Whether depth holds few different whole numbers, as ids do, and segmap more than `most`, or
-    such that are not whole, as only depth does."""
+    such that are not whole, as only depth does.
+
+    Only tells one error from another: such a segmap is none in any case.
+    """
     z, ids = np.asarray(depth), np.asarray(segmap)
     if z.shape != ids.shape or z.dtype.kind not in "iub" or ids.dtype.kind not in "iuf":
         return False
     known = ids[np.isfinite(ids)]
     whole = ids.dtype.kind != "f" or bool((known == np.floor(known)).all())
-    return (not whole or len(np.unique(known)) > most) and len(np.unique(z)) <= most
+    return (not whole or len(np.unique(known)) > most) and len(np.unique(z)) <= FEW
