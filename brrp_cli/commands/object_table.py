@@ -12,12 +12,15 @@ from brrp_cli.reconstruction import OK
 
 if TYPE_CHECKING:
     from brrp_cli.frames.frame import Frame
+    from brrp_cli.observation.support_plane import Plane
     from brrp_cli.reconstruction import ObjectReconstruction, Reconstruction
 
 # Right placements score 0.8 and more; "not in the prior" counts as 0.7.
 LOW_SCORE = 0.75
 # The longest side, metres, of what stands on tables.
 PLAUSIBLE = 0.01, 0.8
+# Metres between the table and the lowest point of what stands on it; meshes end a little early.
+OFF_TABLE = 0.03
 _HEAD = ("id", "taken for", "weight", "size", "± mm", "s", "")
 _RIGHT = ("id", "weight", "size", "± mm", "s")
 
@@ -61,10 +64,10 @@ class Told:
 
 def told(result: Reconstruction) -> list[Told]:
     """All objects, in their order."""
-    return [_told(item, result.frame) for item in result.objects]
+    return [_told(item, result.frame, result.plane) for item in result.objects]
 
 
-def _told(item: ObjectReconstruction, frame: Frame) -> Told:
+def _told(item: ObjectReconstruction, frame: Frame, plane: Plane | None) -> Told:
     outcome = item.outcome
     return Told(
         object_id=item.object_id,
@@ -76,12 +79,12 @@ def _told(item: ObjectReconstruction, frame: Frame) -> Told:
         size_factor=outcome.size_factor,
         uncertainty=item.mean_uncertainty,
         seconds=sum(item.seconds.values()),
-        warnings=tuple(_warnings(item, frame)),
+        warnings=tuple(_warnings(item, frame, plane)),
         failed=item.surface is None,
     )
 
 
-def _warnings(item: ObjectReconstruction, frame: Frame) -> list[str]:
+def _warnings(item: ObjectReconstruction, frame: Frame, plane: Plane | None) -> list[str]:
     """What speaks against trusting the object as it is."""
     found = []
     best = item.recognised
@@ -98,6 +101,12 @@ def _warnings(item: ObjectReconstruction, frame: Frame) -> list[str]:
         longest = float(np.ptp(item.surface.vertices, axis=0).max())
         if not PLAUSIBLE[0] <= longest <= PLAUSIBLE[1]:
             found.append(f"{longest * 100:.3g} cm long: suspect the unit of depth")
+        heights = [0.0] if plane is None else plane.signed_distance(item.surface.vertices)
+        low, high = float(np.min(heights)), float(np.max(heights))
+        if low > OFF_TABLE:
+            found.append(f"{low * 100:.0f} cm above the table: on another object, or a wrong mask")
+        elif high < 0:
+            found.append(f"{-high * 100:.0f} cm below the table: a wrong mask")
     mask = frame.segmap == item.object_id
     if mask[[0, -1]].any() or mask[:, [0, -1]].any():
         found.append("mask at the image's border")

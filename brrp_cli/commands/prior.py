@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from brrp_cli.commands.build_prior import keep_descriptions, told_failures
+from brrp_cli.commands.json_option import json_option, report_of
 from brrp_cli.errors import PriorError
 from brrp_cli.prior.default import locate_prior
 from brrp_cli.prior.locate import output_prior
@@ -141,7 +142,8 @@ def merge(priors: tuple[Path, ...], out: Path, overwrite: bool, clip_dir: Path |
 
 @command.command("list")
 @prior_option
-def list_objects(prior: Path | None) -> None:
+@json_option
+def list_objects(prior: Path | None, as_json: bool) -> None:
     """Print the name and the phrase of each object, with a tab between them.
 
     `brrp info` prints more of each.
@@ -154,8 +156,11 @@ def list_objects(prior: Path | None) -> None:
 
     folder, how = locate_prior(prior)
     opened = open_prior(folder)
-    for name, phrase in zip(opened.names, opened.phrases, strict=True):
-        click.echo(f"{name}\t{phrase}")
+    with report_of(as_json) as report:
+        report["objects"] = dict(zip(opened.names, opened.phrases, strict=True))
+        for name, phrase in report["objects"].items():
+            if not as_json:
+                click.echo(f"{name}\t{phrase}")
     note(f"{len(opened.names)} objects: {folder} ({how})")
 
 
