@@ -8,6 +8,7 @@ result.objects[0].surface.as_trimesh()
 from __future__ import annotations
 
 import time
+from collections.abc import Collection
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -37,6 +38,7 @@ def reconstruct(
     seed: int = 0,
     device: str = "auto",
     workers: int | None = None,
+    only: Collection[int] | None = None,
 ) -> Reconstruction:
     """Reconstruct every object of a segmented frame.
 
@@ -46,6 +48,8 @@ def reconstruct(
         appearance
     weights : a file of what the method was trained to
     workers : objects at a time, by default as many as there are cores
+    only : ids of the objects that are asked for, by default all; the others are still seen as
+        objects
 
     An object that cannot be reconstructed gets a status; the others still are. The frame is never
     changed. The same seed gives the same result, whatever the number of workers.
@@ -62,6 +66,7 @@ def reconstruct(
         retriever=retriever,
         weights=None if weights is None else Path(weights),
         workers=workers,
+        only=None if only is None else frozenset(only),
     )
     chosen.check(setup)
     start = time.perf_counter()
@@ -71,7 +76,8 @@ def reconstruct(
         setup = replace(setup, retriever=choose_retriever("auto", prior, setup.config, seed))
     seconds = {"retriever": time.perf_counter() - start} if chosen.uses_retriever else {}
     result = chosen.run(frame, setup)
-    return replace(result, seconds={**seconds, **result.seconds})
+    objects = [each for each in result.objects if only is None or each.object_id in only]
+    return replace(result, objects=objects, seconds={**seconds, **result.seconds})
 
 
 def open_result(folder: str | Path) -> StoredResult:

@@ -11,6 +11,7 @@ import click
 
 from brrp_cli.errors import BrrpError, unexpected
 from brrp_cli.nearest import nearest
+from brrp_cli.spoken import command_line
 from brrp_cli.stop import sigterm_raises, stopped
 from brrp_cli.version import __version__
 
@@ -113,7 +114,7 @@ class LazyGroup(click.Group):
     def invoke(self, ctx: click.Context) -> object:
         """Run; an error becomes one message on stderr and its exit code, and so does a stop."""
         try:
-            with sigterm_raises():
+            with sigterm_raises(), command_line():
                 return super().invoke(ctx)
         except BrrpError as error:
             failure = error

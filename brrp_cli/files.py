@@ -37,6 +37,14 @@ def is_file(path: Path) -> bool:
         return False
 
 
+def exists(path: Path) -> bool:
+    """Whether there is anything at a path that a user told; no name is an error."""
+    try:
+        return path.exists()
+    except (OSError, ValueError):
+        return False
+
+
 def parse_json(text: str | bytes) -> Any:
     """JSON from a file that may be anything. Errors: ValueError."""
     try:

@@ -6,9 +6,14 @@ import logging
 import sys
 from collections.abc import Callable, Iterable, Iterator, Sized
 from contextlib import contextmanager
-from typing import TypeVar
+from contextvars import ContextVar
+from typing import Any, TypeVar
 
 T = TypeVar("T")
+
+_BAR: ContextVar[Any] = ContextVar("bar", default=None)  # of `only_bar`, where it is drawn
+_ALONE: ContextVar[bool] = ContextVar("alone", default=False)
+_HUSHED: ContextVar[bool] = ContextVar("hushed", default=False)
 
 
 def quiet() -> bool:
@@ -20,14 +25,25 @@ def note(text: str) -> None:
     """Print what is of interest while a command works; its results go to stdout."""
     import click
 
-    if not quiet():
+    if not quiet() and not _HUSHED.get():
         click.echo(text, err=True)
+
+
+def say(text: str) -> None:
+    """Print a result to stdout, clear of the bar that stands on the terminal."""
+    import click
+
+    bar = _BAR.get()
+    if bar is None:
+        click.echo(text)
+    else:
+        bar.write(click.unstyle(text) if not sys.stdout.isatty() else text, file=sys.stdout)
 
 
 def progress(items: Iterable[T], label: str, total: int | None = None) -> Iterable[T]:
     """The same items, counted by a bar on stderr if that is a terminal."""
     # Without a bar no tqdm either: it makes a lock between processes even when it is disabled.
-    if quiet() or not sys.stderr.isatty():
+    if quiet() or _ALONE.get() or not sys.stderr.isatty():
         return items
     from tqdm import tqdm
 
@@ -35,6 +51,43 @@ def progress(items: Iterable[T], label: str, total: int | None = None) -> Iterab
         total = len(items)
     bar: Iterable[T] = tqdm(items, desc=label, total=total, file=sys.stderr)
     return bar
+
+
+@contextmanager
+def only_bar(total: int, label: str) -> Iterator[Callable[[], None]]:
+    """One bar on stderr, if that is a terminal, and none of `progress` beside it; yields what
+    moves it on."""
+    drawn = not quiet() and sys.stderr.isatty()
+    alone = _ALONE.set(True)
+    try:
+        if not drawn:
+            yield lambda: None
+            return
+        from tqdm import tqdm
+
+        with tqdm(total=total, desc=label, file=sys.stderr) as bar:
+            token = _BAR.set(bar)
+            try:
+                yield lambda: bar.update() and None
+            finally:
+                _BAR.reset(token)
+    finally:
+        _ALONE.reset(alone)
+
+
+@contextmanager
+def hushed() -> Iterator[None]:
+    """Without notes, and without what the log tells below warnings, unless that is --verbose."""
+    token = _HUSHED.set(True)
+    log = logging.getLogger("brrp_cli")
+    before = log.level
+    if log.getEffectiveLevel() == logging.INFO:
+        log.setLevel(logging.WARNING)
+    try:
+        yield
+    finally:
+        log.setLevel(before)
+        _HUSHED.reset(token)
 
 
 @contextmanager

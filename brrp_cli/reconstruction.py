@@ -30,6 +30,10 @@ METRES = "metre"
 LOGIT_VARIANCE = "logit^2"
 
 
+ROW = ("id", "taken for", "weight", "size", "± mm", "status")
+LINES = 10  # of a result that is printed
+
+
 class OccupancyPosterior(Protocol):
     """A distribution over one object's shape, in the camera frame.
 
@@ -78,7 +82,7 @@ class StoredPosterior(OccupancyPosterior, Protocol):
         fit the rest."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Surface:
     """A closed, outward triangle mesh.
 
@@ -93,6 +97,10 @@ class Surface:
     uncertainty_unit: str
     colours: NDArray[np.uint8] | None = None
 
+    def __repr__(self) -> str:
+        """Sizes, without the arrays."""
+        return f"Surface({len(self.vertices)} vertices, {len(self.faces)} faces)"
+
     def as_trimesh(self) -> trimesh.Trimesh:
         """The same as a trimesh, vertices in the same order."""
         import trimesh
@@ -100,7 +108,7 @@ class Surface:
         return trimesh.Trimesh(self.vertices, self.faces, process=False)
 
 
-@dataclass
+@dataclass(repr=False)
 class Retrieved:
     """One stored object that was retrieved for one seen object.
 
@@ -123,8 +131,30 @@ class Retrieved:
     alignment_score: float | None = None
     weight: float | None = None
 
+    def __repr__(self) -> str:
+        """Name and numbers, without the poses."""
+        weight = "" if self.weight is None else f", weight {self.weight:.2f}"
+        return f"Retrieved({self.name}, P {self.probability:.2f}{weight})"
 
-@dataclass
+
+@dataclass(frozen=True)
+class Outcome:
+    """What an object was taken for.
+
+    name : the stored object; None = none of them, or nothing is known
+    how : "recognised", "not in the prior", "retrieved" (a method that weighs no placements), or ""
+        (one without a prior)
+    weight : of that in the posterior, or the probability of what was retrieved
+    size_factor : of a recognised object, over its stored size
+    """
+
+    name: str | None
+    how: str
+    weight: float | None
+    size_factor: float | None
+
+
+@dataclass(repr=False)
 class ObjectReconstruction:
     """What is known of one object after inference.
 
@@ -160,8 +190,46 @@ class ObjectReconstruction:
         heavy = [r for r in self.retrieved if r.weight is not None and r.weight > 0.5]
         return heavy[0] if heavy else None
 
+    @property
+    def outcome(self) -> Outcome:
+        """What it was taken for, and how sure that is."""
+        found = self.recognised
+        if found is not None:
+            return Outcome(found.name, "recognised", found.weight, found.size_factor)
+        if self.unknown_weight is not None:
+            return Outcome(None, "not in the prior", self.unknown_weight, None)
+        if self.retrieved:
+            best = self.retrieved[0]
+            return Outcome(best.name, "retrieved", best.probability, None)
+        return Outcome(None, "", None, None)
 
-@dataclass(frozen=True)
+    @property
+    def mean_uncertainty(self) -> float | None:
+        """Over the vertices, metres; None without a surface, or in other units."""
+        if self.surface is None or self.surface.uncertainty_unit != METRES:
+            return None
+        return float(self.surface.uncertainty.mean())
+
+    def row(self) -> tuple[str, str, str, str, str, str]:
+        """Id, what it was taken for, weight, size, mean uncertainty in mm, and status, as text."""
+        outcome, spread = self.outcome, self.mean_uncertainty
+        status = self.status + (f": {self.message}" if self.message else "")
+        return (
+            str(self.object_id),
+            outcome.name or outcome.how or "-",
+            "-" if outcome.weight is None else f"{outcome.weight:.2f}",
+            "-" if outcome.size_factor is None else f"{outcome.size_factor:.2f}",
+            "-" if spread is None else f"{spread * 1000:.1f}",
+            status.split("\n")[0],
+        )
+
+    def __repr__(self) -> str:
+        """One line, without the arrays."""
+        object_id, name, weight, _, spread, status = self.row()
+        return f"Object({object_id}: {name}, weight {weight}, ± {spread} mm, {status})"
+
+
+@dataclass(frozen=True, repr=False)
 class Reconstruction:
     """Everything that is known of a frame's objects, and how it came about.
 
@@ -189,3 +257,34 @@ class Reconstruction:
     def reconstructed(self) -> list[ObjectReconstruction]:
         """The objects that have a surface."""
         return [o for o in self.objects if o.surface is not None]
+
+    @property
+    def title(self) -> str:
+        """What was reconstructed, and how, in one line."""
+        source = self.frame.source
+        name = "a frame" if source is None else source.name
+        by = f"retrieved by {self.retriever}" if self.retriever else "no prior"
+        made = f"{len(self.reconstructed)} of {len(self.objects)} objects of {name}"
+        return f"{made}; {self.method}, {by}, seed {self.seed}"
+
+    def __repr__(self) -> str:
+        """Ten lines at most: what each object was taken for, without the arrays."""
+        rows = [ROW, *(item.row() for item in self.objects)]
+        widths = [max(len(row[i]) for row in rows) for i in range(len(ROW) - 1)]
+        lines = [
+            "  " + "  ".join([*map(str.ljust, row[:-1], widths), row[-1]]).rstrip() for row in rows
+        ]
+        left = len(lines) - (LINES - 1)
+        if left > 0:
+            lines[LINES - 2 :] = [f"  ... {left + 1} more: result.objects"]
+        return "\n".join([self.title, *lines])
+
+    def _repr_html_(self) -> str:
+        """For notebooks: image and masks above the table of all objects."""
+        from brrp_cli.notebook import picture_html, result_html, table_html
+        from brrp_cli.segmentation.mask_picture import draw_masks
+
+        picture = picture_html(draw_masks(self.frame.rgb, self.frame.segmap))
+        return result_html(
+            self.title, picture, table_html(ROW, [item.row() for item in self.objects])
+        )

@@ -16,12 +16,14 @@ from typing import TYPE_CHECKING, Any, cast
 
 from brrp_cli.api import reconstruct
 from brrp_cli.config.segmentation import SegmentConfig
+from brrp_cli.config.tracking import TrackConfig
 from brrp_cli.errors import FrameError
 from brrp_cli.frames.frame import Frame
 from brrp_cli.methods.configuration import MethodConfig
 from brrp_cli.methods.registry import DEFAULT, reconstructing_method
 from brrp_cli.prior.store import Prior, open_prior
-from brrp_cli.reconstruction import Reconstruction
+from brrp_cli.reconstruction import ObjectReconstruction, Reconstruction
+from brrp_cli.tracking import Followed, first_frame, follow, unmoved
 
 if TYPE_CHECKING:
     from brrp_cli.retrieval.base import Retriever
@@ -36,8 +38,11 @@ class Reconstructor:
     retriever : a name as `brrp reconstruct --retriever` takes it
     prompt : makes masks of what it names where a frame has none; None = of what stands on the
         table, without a model; segmentation : the numbers of both
+    track : whether frames are those of one stream: an object keeps its id, and one that has not
+        moved before a camera that stands keeps its result; or the numbers of that
 
-    The same frame and seed give the same result as a process of its own. Errors: BrrpError.
+    Without `track` the same frame and seed give the same result as a process of its own.
+    Errors: BrrpError.
     """
 
     def __init__(
@@ -55,7 +60,12 @@ class Reconstructor:
         seed: int = 0,
         device: str = "auto",
         workers: int | None = None,
+        track: bool | TrackConfig = False,
     ) -> None:
+        self._track = TrackConfig() if track is True else track or None
+        self._last: Followed | None = None
+        # Frames, and what was inferred from each and still holds.
+        self._made: list[tuple[Frame, Reconstruction]] = []
         self._workers = workers
         self._method, self._seed, self._device, self._prompt = method, seed, device, prompt
         self._weights = weights
@@ -84,8 +94,50 @@ class Reconstructor:
         start = time.perf_counter()
         masked = frame if frame.object_ids else self._with_masks(frame)
         seconds = time.perf_counter() - start
-        result = reconstruct(
-            masked,
+        result = self._tracked(masked) if self._track is not None else self._all(masked)
+        result.seconds["masks"] = seconds
+        if masked is frame:
+            return result
+        return replace(result, segmentation=asdict(self._segmentation))
+
+    def _tracked(self, frame: Frame) -> Reconstruction:
+        """All objects under the ids of their tracks; those that have not moved as they were."""
+        assert self._track is not None
+        start = time.perf_counter()
+        followed = (
+            first_frame(frame) if self._last is None else follow(self._last, frame, self._track)
+        )
+        seen, kept = followed.frame, []
+        # Held to the frame that they were inferred from: what creeps is found in the end.
+        for made, result in self._made:
+            still = unmoved(made, seen, self._track)
+            kept += [each for each in result.reconstructed if each.object_id in still]
+        seconds = time.perf_counter() - start
+        todo = set(seen.object_ids) - {item.object_id for item in kept}
+        if todo or not self._made:
+            result = self._all(seen, todo)
+        else:
+            result = replace(self._made[0][1], frame=seen, objects=[], seconds={})
+        made_before = self._only(kept)
+        self._made = [(seen, result), *made_before] if todo else made_before
+        objects = [*result.objects, *(replace(item, seconds={}) for item in kept)]
+        result = replace(result, objects=sorted(objects, key=lambda item: item.object_id))
+        result.seconds["tracking"] = seconds
+        self._last = followed
+        return result
+
+    def _only(self, kept: list[ObjectReconstruction]) -> list[tuple[Frame, Reconstruction]]:
+        """What was made of earlier frames, less what is not kept any more."""
+        ids = {item.object_id for item in kept}
+        left = [
+            (frame, replace(made, objects=[o for o in made.objects if o.object_id in ids]))
+            for frame, made in self._made
+        ]
+        return [(frame, made) for frame, made in left if made.objects]
+
+    def _all(self, frame: Frame, only: set[int] | None = None) -> Reconstruction:
+        return reconstruct(
+            frame,
             self._prior,
             method=self._method,
             config=self._config,
@@ -94,11 +146,8 @@ class Reconstructor:
             seed=self._seed,
             device=self._device,
             workers=self._workers,
+            only=only,
         )
-        result.seconds["masks"] = seconds
-        if masked is frame:
-            return result
-        return replace(result, segmentation=asdict(self._segmentation))
 
     def stream(self, frames: Iterable[Frame]) -> Iterator[Reconstruction | FrameError]:
         """One answer for each frame: a frame that cannot be used gives its error and ends

@@ -109,7 +109,7 @@ def read_real(folder: Path) -> Frame:
     K = np.array([[numbers["fx"], 0, cx], [0, numbers["fy"], cy], [0, 0, 1]])
     rgb = np.asarray(Image.open(folder / "color.png").convert("RGB"))
     depth = np.asarray(Image.open(folder / "depth.png")).astype(np.uint16)
-    return make_frame(rgb, None, depth=depth, K=K, source=folder)
+    return make_frame(rgb=rgb, depth=depth, K=K, source=folder)
 
 
 def made_frames(scenes: Path) -> Iterator[Frame]:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import click
 
 from brrp_cli.commands.scheduler_option import scheduler_option
-from brrp_cli.commands.seed_option import SEED
+from brrp_cli.commands.seed_option import SEED, SEED_HELP
 from brrp_cli.errors import BrrpError
 from brrp_cli.prior.locate import output_prior
 from brrp_cli.prior.parameters import UNITS, BuildParameters
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 @click.command("build-prior")
 @click.argument("meshes", type=click.Path(path_type=Path), nargs=-1, required=True)
-@click.option("-o", "--out", type=click.Path(path_type=Path), help="Folder of the prior.")
+@click.option("-o", "--output", "out", type=click.Path(path_type=Path), help="Folder of the prior.")
 @click.option(
     "--descriptions",
     type=click.Path(path_type=Path),
@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     show_default=True,
     help="Labelled samples for each object.",
 )
-@click.option("--seed", type=SEED, default=0, show_default=True)
+@click.option("--seed", type=SEED, default=0, show_default=True, help=SEED_HELP)
 @click.option(
     "--workers", type=click.IntRange(1), help="Processes; as many as processors if not said."
 )

@@ -26,7 +26,11 @@ def command() -> None:
 @click.option(
     "--method", type=OneOf(lambda: list(METHODS)), default=DEFAULT, show_default=True, help="Whose."
 )
-@click.option("--preset", type=OneOf(preset_names), help="[default: the method's first]")
+@click.option(
+    "--preset",
+    type=OneOf(preset_names),
+    help="A named configuration of the method. [default: its first]",
+)
 @click.option("--config", "file", type=click.Path(path_type=Path), help="With its changes.")
 def show(method: str, preset: str | None, file: Path | None) -> None:
     """Print a configuration as TOML, which --config of other commands takes, whole or in part.

@@ -13,7 +13,7 @@ import click
 from brrp_cli.commands.json_option import json_option, report_of
 from brrp_cli.commands.method_options import OneOf
 from brrp_cli.commands.object_table import told
-from brrp_cli.commands.seed_option import SEED
+from brrp_cli.commands.seed_option import SEED, device_option
 from brrp_cli.methods.registry import DEFAULT, METHODS
 from brrp_cli.progress import note
 
@@ -36,6 +36,7 @@ NOT_STORED = "none of them"
     type=click.Path(path_type=Path),
     default=Path("brrp_demo"),
     show_default=True,
+    help="Folder to write.",
 )
 @click.option(
     "--seed", type=SEED, default=0, show_default=True, help="Another seed, another scene."
@@ -44,9 +45,9 @@ NOT_STORED = "none of them"
     "--preset",
     "preset_name",
     type=OneOf(lambda: list(METHODS[DEFAULT].presets)),
-    help="[default: the first]",
+    help="A named configuration of the method. [default: the first]",
 )
-@click.option("--device", type=click.Choice(["auto", "cpu", "cuda"]), default="auto")
+@device_option
 @json_option
 @click.option("--overwrite", is_flag=True, help="Replace the output folder if it is there.")
 def command(
@@ -68,10 +69,15 @@ def command(
       brrp demo
       brrp demo --seed 3 --preset paper -o demo3/
     """
+    from brrp_cli.files import atomic_folder, check_writable, refuse_folder
+
+    # Before what takes long to import.
+    refuse_folder(output, overwrite=overwrite, mark=FRAME)
+    check_writable(output.parent)
+
     from brrp_cli.api import reconstruct
     from brrp_cli.demo.scene import make_scene
     from brrp_cli.demo.score import score
-    from brrp_cli.files import atomic_folder, check_writable, refuse_folder
     from brrp_cli.frames.npz import save_frame
     from brrp_cli.prior.build.starter import starter_prior
     from brrp_cli.prior.store import open_prior
@@ -79,8 +85,6 @@ def command(
     from brrp_cli.retrieval.choose import choose_retriever
 
     start = time.perf_counter()
-    refuse_folder(output, overwrite=overwrite, mark=FRAME)
-    check_writable(output.parent)
     prior = open_prior(starter_prior())
     note(f"Prior: {prior.path} (starter prior), {len(prior.names)} household shapes")
     scene = make_scene(seed)

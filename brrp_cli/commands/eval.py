@@ -19,7 +19,8 @@ from brrp_cli.commands.method_options import (
 )
 from brrp_cli.commands.retriever_option import RetrieverName
 from brrp_cli.commands.scheduler_option import scheduler_option
-from brrp_cli.commands.seed_option import SEED
+from brrp_cli.commands.seed_option import SEED, SEED_HELP, device_option
+from brrp_cli.errors import SceneError
 from brrp_cli.methods.registry import COMPARED, METHODS, preset_names
 from brrp_cli.progress import note
 from brrp_cli.retrieval.choose import RETRIEVERS
@@ -54,7 +55,12 @@ def _selection(ctx: click.Context, option: click.Parameter, value: str | None) -
 @click.command("eval")
 @click.argument("scenes", type=click.Path(path_type=Path))
 @click.option("--prior", "prior_path", type=click.Path(path_type=Path), help="The prior to use.")
-@click.option("-o", "--output", type=click.Path(path_type=Path), help="[default: SCENES_eval/]")
+@click.option(
+    "-o",
+    "--output",
+    type=click.Path(path_type=Path),
+    help="Folder to write. [default: SCENES_eval/]",
+)
 @click.option(
     "--data-root",
     type=click.Path(path_type=Path),
@@ -79,7 +85,7 @@ def _selection(ctx: click.Context, option: click.Parameter, value: str | None) -
     "presets",
     multiple=True,
     callback=_several(OneOf(preset_names)),
-    help=f"Of {', '.join(preset_names())}. [default: each method's first]",
+    help=f"Named configurations: {', '.join(preset_names())}. [default: each method's first]",
 )
 @click.option(
     "--config",
@@ -122,8 +128,8 @@ def _selection(ctx: click.Context, option: click.Parameter, value: str | None) -
 @click.option("--workers", type=click.IntRange(1), help="Processes of one thread. [default: cores]")
 @scheduler_option
 @click.option("--pictures", is_flag=True, help="Write a picture of each scene and variant.")
-@click.option("--seed", type=SEED, default=0, show_default=True)
-@click.option("--device", type=click.Choice(["auto", "cpu", "cuda"]), default="auto")
+@click.option("--seed", type=SEED, default=0, show_default=True, help=SEED_HELP)
+@device_option
 @json_option
 @click.option("--overwrite", is_flag=True, help="Start anew where another run's rows are.")
 def command(
@@ -164,6 +170,9 @@ def command(
 
     Exit codes: 0 all objects have a result, 3 some failed.
     """
+    if not scenes.exists():  # told before what takes long to import
+        raise SceneError("No such folder of scenes", where=scenes, fix="check the path")
+
     from brrp_cli.evaluation.request import Request, evaluate
     from brrp_cli.evaluation.summary import as_record
 

@@ -8,7 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from brrp_cli.commands.seed_option import SEED
+from brrp_cli.commands.json_option import json_option, report_of
+from brrp_cli.commands.results_folder import require_results
+from brrp_cli.commands.seed_option import SEED, SEED_HELP
 from brrp_cli.planning.options import DENSITY, PlanOptions
 from brrp_cli.planning.parts import COACD, HOW, check_available
 from brrp_cli.progress import note
@@ -23,7 +25,9 @@ CONFIDENCE = click.FloatRange(0.5, 0.999)
 
 @click.command("export")
 @click.argument("results", metavar="OUT/", type=click.Path(path_type=Path))
-@click.option("-o", "--output", type=click.Path(path_type=Path), help="[default: OUT/plan]")
+@click.option(
+    "-o", "--output", type=click.Path(path_type=Path), help="Folder to write. [default: OUT/plan]"
+)
 @click.option(
     "--collision",
     type=click.Choice(HOW),
@@ -51,7 +55,8 @@ CONFIDENCE = click.FloatRange(0.5, 0.999)
     show_default=True,
     help="kg / m^3 of solid objects, for mass and inertia.",
 )
-@click.option("--seed", type=SEED, default=0, show_default=True)
+@click.option("--seed", type=SEED, default=0, show_default=True, help=SEED_HELP)
+@json_option
 @click.option("--overwrite", is_flag=True, help="Replace the output folder if it is there.")
 def command(
     results: Path,
@@ -61,6 +66,7 @@ def command(
     margin: float,
     density: float,
     seed: int,
+    as_json: bool,
     overwrite: bool,
 ) -> None:
     """Turn results into collision shapes: URDF, MJCF, a cuRobo world.
@@ -74,19 +80,24 @@ def command(
       brrp export out/ --collision hull
       brrp export out/ --confidence 0.95 -o plan/
     """
-    from brrp_cli.api import open_result
-
     if margin and confidence is None:
         raise click.UsageError("--margin grows the shapes of --confidence, so give both")
+    require_results(results)
+
+    from brrp_cli.api import open_result
+
     check_available(collision)
     options = PlanOptions(collision, confidence, margin / 1000, density, seed)
-    export(open_result(results), output, options, overwrite=overwrite)
+    with report_of(as_json) as report:
+        record = export(open_result(results), output, options, overwrite=overwrite)
+        report["output"] = str(output or results / FOLDER)
+        report.update(record)
 
 
 def export(
     stored: StoredResult, output: Path | None, options: PlanOptions, *, overwrite: bool
-) -> None:
-    """Write the plan, with a line for each object. Errors: those of `write_plan`."""
+) -> dict[str, Any]:
+    """Write the plan, with a line for each object; its record. Errors: those of `write_plan`."""
     from brrp_cli.planning.write import write_plan
 
     folder = output or stored.folder / FOLDER
@@ -107,6 +118,7 @@ def export(
         f"objects, metres, {record['frame']} frame: {folder}/ "
         "(object_*.urdf, object_*.xml, scene.xml, world.yml, scene.glb, plan.json)"
     )
+    return record
 
 
 def told(item: dict[str, Any]) -> str:

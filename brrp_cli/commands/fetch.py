@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from shlex import quote
 
 import click
 
@@ -34,7 +35,8 @@ MESHES = ("ycb", "household")
 )
 @click.option(
     "-o",
-    "--out",
+    "--output",
+    "out",
     type=click.Path(path_type=Path),
     help="Folder to fill with meshes. [default: meshes/ycb or meshes/household in the user's data "
     "folder]",
@@ -147,5 +149,5 @@ def _meshes(what: str, out: Path | None, source: str | None) -> None:
     click.echo(
         f"{meshes.title} ({meshes.licence}), {size:.0f} MB: {len(fetched.brought)} files fetched, "
         f"{there} there already, {'' if fetched.unchecked else 'all '}checked: {folder}. "
-        f"Use: brrp build-prior {folder}"
+        f"Use: brrp build-prior {quote(str(folder))}"
     )

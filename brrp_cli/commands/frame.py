@@ -8,7 +8,7 @@ from shlex import quote
 import click
 
 from brrp_cli.commands.seed_option import SEED
-from brrp_cli.commands.source_options import SourceOptions, source_options
+from brrp_cli.commands.source_options import SourceOptions, require_output, source_options
 from brrp_cli.errors import FrameError, OutputError
 
 
@@ -16,9 +16,11 @@ from brrp_cli.errors import FrameError, OutputError
 @source_options
 @click.option("--segment", is_flag=True, help="Find what stands on the table, without masks.")
 @click.option("--seed", type=SEED, default=0, show_default=True, help="Seed of the plane search.")
-@click.option("-o", "--output", type=click.Path(path_type=Path), required=True, help="FRAME.npz")
+@click.option("-o", "--output", type=click.Path(path_type=Path), help="FRAME.npz")
 @click.option("--overwrite", is_flag=True, help="Replace what stands at the output.")
-def command(source: SourceOptions, segment: bool, seed: int, output: Path, overwrite: bool) -> None:
+def command(
+    source: SourceOptions, segment: bool, seed: int, output: Path | None, overwrite: bool
+) -> None:
     """Turn colour and depth images, or SOURCE, into a frame for `brrp reconstruct`.
 
     SOURCE is a folder or file of a known format: a frame file (.npz), one of BRRP's real scenes,
@@ -29,6 +31,7 @@ def command(source: SourceOptions, segment: bool, seed: int, output: Path, overw
     \b
     Example:
       brrp frame --color c.png --depth d.png --intrinsics k.json --segment -o frame.npz
+      brrp frame bop/ycbv/test --list
       brrp frame bop/ycbv/test --index 000048/1 -o frame.npz
       brrp frame recording.bag --index 30 --prompt "small object" -o frame.npz
     """
@@ -38,6 +41,7 @@ def command(source: SourceOptions, segment: bool, seed: int, output: Path, overw
         raise click.UsageError("--masks and --segment exclude each other")
     if segment and source.prompt is not None:
         raise click.UsageError("--segment uses no model: leave it out beside --prompt")
+    output = require_output(output)
     if output.suffix != ".npz":
         raise click.UsageError(f"-o must end in .npz, not {output.name!r}")
     picture = output.with_suffix(".masks.png")

@@ -8,16 +8,19 @@ from typing import TYPE_CHECKING, Any
 import click
 import numpy as np
 
-from brrp_cli.reconstruction import METRES, OK
+from brrp_cli.reconstruction import OK
 
 if TYPE_CHECKING:
     from brrp_cli.frames.frame import Frame
+    from brrp_cli.observation.support_plane import Plane
     from brrp_cli.reconstruction import ObjectReconstruction, Reconstruction
 
 # Right placements score 0.8 and more; "not in the prior" counts as 0.7.
 LOW_SCORE = 0.75
 # The longest side, metres, of what stands on tables.
 PLAUSIBLE = 0.01, 0.8
+# Metres between the table and the lowest point of what stands on it; meshes end a little early.
+OFF_TABLE = 0.03
 _HEAD = ("id", "taken for", "weight", "size", "± mm", "s", "")
 _RIGHT = ("id", "weight", "size", "± mm", "s")
 
@@ -26,11 +29,9 @@ _RIGHT = ("id", "weight", "size", "± mm", "s")
 class Told:
     """What is told of one object.
 
-    taken_for : the stored object, None = none of them or nothing known; how : "recognised", "not in
-    the prior", "retrieved" (a method that weighs no placements) or "" (one without a prior)
-    weight : of that in the posterior, or the probability of what was retrieved
-    size_factor : of a recognised object, over its stored size
+    taken_for, how, weight, size_factor : as of `Outcome`
     uncertainty : mean over the mesh, metres; None in other units
+    failed : whether it has no mesh
     """
 
     object_id: int
@@ -43,6 +44,7 @@ class Told:
     uncertainty: float | None
     seconds: float
     warnings: tuple[str, ...]
+    failed: bool
 
     def record(self) -> dict[str, Any]:
         """For --json; metres."""
@@ -62,43 +64,27 @@ class Told:
 
 def told(result: Reconstruction) -> list[Told]:
     """All objects, in their order."""
-    return [_told(item, result.frame) for item in result.objects]
+    return [_told(item, result.frame, result.plane) for item in result.objects]
 
 
-def _told(item: ObjectReconstruction, frame: Frame) -> Told:
-    name, how, weight, size = _outcome(item)
-    surface = item.surface
-    in_metres = surface is not None and surface.uncertainty_unit == METRES
+def _told(item: ObjectReconstruction, frame: Frame, plane: Plane | None) -> Told:
+    outcome = item.outcome
     return Told(
         object_id=item.object_id,
         status=item.status,
         message=item.message,
-        taken_for=name,
-        how=how,
-        weight=weight,
-        size_factor=size,
-        uncertainty=float(surface.uncertainty.mean()) if surface and in_metres else None,
+        taken_for=outcome.name,
+        how=outcome.how,
+        weight=outcome.weight,
+        size_factor=outcome.size_factor,
+        uncertainty=item.mean_uncertainty,
         seconds=sum(item.seconds.values()),
-        warnings=tuple(_warnings(item, frame)),
+        warnings=tuple(_warnings(item, frame, plane)),
+        failed=item.surface is None,
     )
 
 
-def _outcome(
-    item: ObjectReconstruction,
-) -> tuple[str | None, str, float | None, float | None]:
-    """`taken_for`, `how`, `weight` and `size_factor` of `Told`."""
-    found = item.recognised
-    if found is not None:
-        return found.name, "recognised", found.weight, found.size_factor
-    if item.unknown_weight is not None:
-        return None, "not in the prior", item.unknown_weight, None
-    if item.retrieved:
-        best = item.retrieved[0]
-        return best.name, "retrieved", best.probability, None
-    return None, "", None, None
-
-
-def _warnings(item: ObjectReconstruction, frame: Frame) -> list[str]:
+def _warnings(item: ObjectReconstruction, frame: Frame, plane: Plane | None) -> list[str]:
     """What speaks against trusting the object as it is."""
     found = []
     best = item.recognised
@@ -115,6 +101,12 @@ def _warnings(item: ObjectReconstruction, frame: Frame) -> list[str]:
         longest = float(np.ptp(item.surface.vertices, axis=0).max())
         if not PLAUSIBLE[0] <= longest <= PLAUSIBLE[1]:
             found.append(f"{longest * 100:.3g} cm long: suspect the unit of depth")
+        heights = [0.0] if plane is None else plane.signed_distance(item.surface.vertices)
+        low, high = float(np.min(heights)), float(np.max(heights))
+        if low > OFF_TABLE:
+            found.append(f"{low * 100:.0f} cm above the table: on another object, or a wrong mask")
+        elif high < 0:
+            found.append(f"{-high * 100:.0f} cm below the table: a wrong mask")
     mask = frame.segmap == item.object_id
     if mask[[0, -1]].any() or mask[:, [0, -1]].any():
         found.append("mask at the image's border")

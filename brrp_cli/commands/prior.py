@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from brrp_cli.commands.build_prior import keep_descriptions, told_failures
+from brrp_cli.commands.json_option import json_option, report_of
 from brrp_cli.errors import PriorError
 from brrp_cli.prior.default import locate_prior
 from brrp_cli.prior.locate import output_prior
@@ -118,7 +119,9 @@ def remove(names: tuple[str, ...], prior: Path | None) -> None:
 
 @command.command("merge")
 @click.argument("priors", type=click.Path(path_type=Path), nargs=-1, required=True)
-@click.option("-o", "--out", type=click.Path(path_type=Path), required=True, help="Folder to fill.")
+@click.option(
+    "-o", "--output", "out", type=click.Path(path_type=Path), required=True, help="Folder to fill."
+)
 @click.option("--overwrite", is_flag=True, help="Replace another prior that is there.")
 @clip_option
 def merge(priors: tuple[Path, ...], out: Path, overwrite: bool, clip_dir: Path | None) -> None:
@@ -139,7 +142,8 @@ def merge(priors: tuple[Path, ...], out: Path, overwrite: bool, clip_dir: Path |
 
 @command.command("list")
 @prior_option
-def list_objects(prior: Path | None) -> None:
+@json_option
+def list_objects(prior: Path | None, as_json: bool) -> None:
     """Print the name and the phrase of each object, with a tab between them.
 
     `brrp info` prints more of each.
@@ -152,8 +156,11 @@ def list_objects(prior: Path | None) -> None:
 
     folder, how = locate_prior(prior)
     opened = open_prior(folder)
-    for name, phrase in zip(opened.names, opened.phrases, strict=True):
-        click.echo(f"{name}\t{phrase}")
+    with report_of(as_json) as report:
+        report["objects"] = dict(zip(opened.names, opened.phrases, strict=True))
+        for name, phrase in report["objects"].items():
+            if not as_json:
+                click.echo(f"{name}\t{phrase}")
     note(f"{len(opened.names)} objects: {folder} ({how})")
 
 
@@ -162,7 +169,8 @@ def list_objects(prior: Path | None) -> None:
 @prior_option
 @click.option(
     "-o",
-    "--out",
+    "--output",
+    "out",
     type=click.Path(path_type=Path, dir_okay=False),
     help="PNG to write: the object in its colours, in its most probable resting pose.",
 )

@@ -13,6 +13,7 @@ import click
 from brrp_cli.commands.export import CONFIDENCE, export
 from brrp_cli.commands.frame import refuse_existing
 from brrp_cli.commands.json_option import json_option, report_of
+from brrp_cli.commands.many_frames import Work, check_many, frame_slice, run_many
 from brrp_cli.commands.method_options import (
     CONFIG_HELP,
     OneOf,
@@ -21,9 +22,9 @@ from brrp_cli.commands.method_options import (
     methods_help,
     weights_help,
 )
-from brrp_cli.commands.object_table import lines, told
+from brrp_cli.commands.object_table import Told, lines, told
 from brrp_cli.commands.retriever_option import RetrieverName
-from brrp_cli.commands.seed_option import SEED
+from brrp_cli.commands.seed_option import SEED, SEED_HELP, device_option
 from brrp_cli.commands.source_options import SourceOptions, source_options
 from brrp_cli.commands.view import PAGE, title, view
 from brrp_cli.files import atomic_path
@@ -48,8 +49,20 @@ NO_COLLISION = "none"
 
 @click.command("reconstruct")
 @source_options
+@click.option(
+    "--frames",
+    metavar="A:B",
+    callback=frame_slice,
+    help="Many frames of SOURCE: from A until before B, counted from 0; `:` is all. Each goes into"
+    " OUT/FRAME/; those that are there are left.",
+)
 @click.option("--prior", "prior_path", type=click.Path(path_type=Path), help="The prior to use.")
-@click.option("-o", "--output", type=click.Path(path_type=Path), help="[default: SOURCE_METHOD/]")
+@click.option(
+    "-o",
+    "--output",
+    type=click.Path(path_type=Path),
+    help="Folder to write. [default: SOURCE_METHOD/]",
+)
 @click.option(
     "--method",
     type=OneOf(reconstructing),
@@ -82,9 +95,16 @@ NO_COLLISION = "none"
     type=click.Path(path_type=Path),
     help=f"Folder with CLIP ViT-B/16 as ONNX. [default: {CLIP_DIR_VARIABLE}, else the fetched]",
 )
-@click.option("--frame", "coordinates", type=click.Choice(["camera", "world"]), default="camera")
-@click.option("--seed", type=SEED, default=0, show_default=True)
-@click.option("--device", type=click.Choice(["auto", "cpu", "cuda"]), default="auto")
+@click.option(
+    "--frame",
+    "coordinates",
+    type=click.Choice(["camera", "world"]),
+    default="camera",
+    show_default=True,
+    help="Coordinates of the meshes; world needs the camera's pose (--camera-pose).",
+)
+@click.option("--seed", type=SEED, default=0, show_default=True, help=SEED_HELP)
+@device_option
 @click.option("--workers", type=click.IntRange(1), help="Objects at a time. [default: cores]")
 @click.option(
     "--collision",
@@ -109,6 +129,7 @@ NO_COLLISION = "none"
 @click.option("--overwrite", is_flag=True, help="Replace the output folder if it is there.")
 def command(
     source: SourceOptions,
+    frames: slice | None,
     prior_path: Path | None,
     output: Path | None,
     method: str,
@@ -149,15 +170,18 @@ def command(
       brrp reconstruct frame.npz --method pointsdf --weights prior.safetensors
       brrp reconstruct frame.npz --collision coacd --confidence 0.95
       brrp reconstruct frame.npz --prior prior/ --poses bop
+      brrp reconstruct recording.bag --frames 0:300:30 --prior prior/ -o out/
     """
+    source.check()
+    check_weights([method], [] if weights is None else [weights])
+
     from brrp_cli.api import open_result, reconstruct
     from brrp_cli.config.segmentation import SegmentConfig
     from brrp_cli.methods.config_file import read_config
+    from brrp_cli.methods.configuration import as_record
     from brrp_cli.results.bop import bop_csv
     from brrp_cli.results.write import check_output, write_results
 
-    source.check()
-    check_weights([method], [] if weights is None else [weights])
     check_collision(collision, confidence)
     chosen = METHODS[method]
     check_options(chosen, preset_name, device)
@@ -166,36 +190,48 @@ def command(
     config = replace(config, k=k) if k else config
     output = output or source.name.with_name(f"{source.name.name}_{method}")
     # What can be refused is refused before the work, not after it.
-    frame = source.read()
-    check_output(output, frame, coordinates, overwrite=overwrite)
-    masks = None
-    if source.prompt is not None or not frame.object_ids:
-        masks = SegmentConfig() if read is None else read.segmentation()
-        frame = make_masks(source, frame, output, seed, masks, overwrite=overwrite)
+    if frames is not None:
+        check_many(source, output, open_it=open_it)
+    else:
+        seen = source.read()
+        check_output(output, seen, coordinates, overwrite=overwrite)
+    mask_config = SegmentConfig() if read is None else read.segmentation()
+
+    def with_masks(frame: Frame, folder: Path) -> tuple[Frame, SegmentConfig | None]:
+        if source.prompt is None and frame.object_ids:
+            return frame, None
+        again = overwrite or frames is not None
+        made = make_masks(source, frame, folder, seed, mask_config, overwrite=again)
+        return made, mask_config
+
+    if frames is None:
+        seen, masks = with_masks(seen, output)
     prior, retrieval = open_prior_of(chosen, prior_path, config, retriever, clip_dir, seed)
     if prior is not None and k is not None and k > len(prior.names):
         note(f"--k {k}: the prior holds {len(prior.names)} objects, all of them are taken")
     if prior is None:
         trained = "" if weights is None else f", weights {weights}"
         note(f"Method: {method}, without a prior{trained}")
-    result = reconstruct(
-        frame,
-        prior,
-        method=method,
-        config=config,
-        retriever=retrieval,
-        weights=weights,
-        seed=seed,
-        device=device,
-        workers=workers,
-    )
-    if masks is not None:
-        result = replace(result, segmentation=asdict(masks))
-    write_results(result, output, frame=coordinates, overwrite=overwrite)
-    table = told(result)
-    done = len(result.reconstructed)
-    recognised = sum(item.recognised is not None for item in result.objects)
-    with report_of(as_json) as report:
+
+    def one(frame: Frame, masks: SegmentConfig | None, output: Path) -> list[Told]:
+        """Reconstruct a frame, write it all, and say what was written."""
+        result = reconstruct(
+            frame,
+            prior,
+            method=method,
+            config=config,
+            retriever=retrieval,
+            weights=weights,
+            seed=seed,
+            device=device,
+            workers=workers,
+        )
+        if masks is not None:
+            result = replace(result, segmentation=asdict(masks))
+        write_results(result, output, frame=coordinates, overwrite=overwrite)
+        table = told(result)
+        done = len(result.reconstructed)
+        recognised = sum(item.recognised is not None for item in result.objects)
         for line in lines(table):
             click.echo(line)
         meshes = "object_*.ply, scene.glb, " if done else "no mesh: result.json says why; "
@@ -212,10 +248,27 @@ def command(
             export(open_result(output), None, options, overwrite=False)
         if html or open_it:
             view(open_result(output), title(output), output / PAGE, open_it=open_it)
+        return table
+
+    with report_of(as_json) as report:
         report["output"] = str(output)
         report["frame"] = coordinates
-        report["objects"] = [each.record() for each in table]
-    if done < len(result.objects):
+        if frames is not None:
+            settings = {
+                "method": method,
+                "seed": seed,
+                "frame": coordinates,
+                "retriever": None if retrieval is None else retrieval.name,
+                "prior": None if prior is None else prior.digest,
+                "config": as_record(config),
+            }
+            work = Work(source, with_masks, one, settings, overwrite=overwrite)
+            failed = run_many(work, frames, output, report)
+        else:
+            table = one(seen, masks, output)
+            report["objects"] = [each.record() for each in table]
+            failed = any(each.failed for each in table)
+    if failed:
         sys.exit(SOME_FAILED)
 
 

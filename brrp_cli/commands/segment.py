@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from brrp_cli.commands.frame import refuse_existing, tell
+from brrp_cli.commands.json_option import json_option, report_of
 from brrp_cli.commands.method_options import CONFIG_HELP
-from brrp_cli.commands.seed_option import SEED
-from brrp_cli.commands.source_options import SourceOptions, source_options
+from brrp_cli.commands.seed_option import SEED, SEED_HELP
+from brrp_cli.commands.source_options import SourceOptions, require_output, source_options
 
 if TYPE_CHECKING:
     from brrp_cli.frames.frame import Frame
@@ -50,8 +51,9 @@ def _splits(
 )
 @click.option("--drop", "drops", multiple=True, callback=_ids, metavar="ID", help="Forget them.")
 @click.option("--config", "file", type=click.Path(path_type=Path), help=CONFIG_HELP)
-@click.option("--seed", type=SEED, default=0, show_default=True)
-@click.option("-o", "--output", type=click.Path(path_type=Path), required=True, help="FRAME.npz")
+@click.option("--seed", type=SEED, default=0, show_default=True, help=SEED_HELP)
+@click.option("-o", "--output", type=click.Path(path_type=Path), help="FRAME.npz")
+@json_option
 @click.option("--overwrite", is_flag=True, help="Replace what stands at the output.")
 def command(
     source: SourceOptions,
@@ -61,7 +63,8 @@ def command(
     drops: list[list[int]],
     file: Path | None,
     seed: int,
-    output: Path,
+    output: Path | None,
+    as_json: bool,
     overwrite: bool,
 ) -> None:
     """Make masks, show them, and correct them by the ids that the picture shows.
@@ -77,6 +80,7 @@ def command(
       brrp segment scene/ --prompt "small object" -o frame.npz
     """
     source.check()
+    output = require_output(output)
     if output.suffix != ".npz":
         raise click.UsageError(f"-o must end in .npz, not {output.name!r}")
     if any(len(ids) < 2 for ids in merges):
@@ -102,27 +106,38 @@ def command(
         frame = replace(frame, segmap=edit_masks.merge(frame, group))
     for group in drops:
         frame = replace(frame, segmap=edit_masks.drop(frame, group))
-    _report(require_objects(frame), before)
-    write_picture(frame, picture)
-    write_ids(frame, ids)
-    save_frame(frame, output)
-    tell(frame.shape, len(frame.object_ids), output, picture)
+    with report_of(as_json) as report:
+        report["objects"] = _report(require_objects(frame), before)
+        write_picture(frame, picture)
+        write_ids(frame, ids)
+        save_frame(frame, output)
+        tell(frame.shape, len(frame.object_ids), output, picture)
+        report["output"] = str(output)
 
 
-def _report(frame: Frame, before: Frame) -> None:
-    """A line for each object: what it covers, how large it is, how far away."""
+def _report(frame: Frame, before: Frame) -> list[dict[str, Any]]:
+    """A line for each object: what it covers, how large it is, how far away; the same in metres."""
     import numpy as np
 
+    told: list[dict[str, Any]] = []
     click.echo("  id  pixels  with depth  width x height x depth, cm  distance, cm")
     for object_id in frame.object_ids:
         points = frame.object_points(object_id)
         pixels = int((frame.segmap == object_id).sum())
-        size = "no depth"
-        distance = ""
+        about: dict[str, Any] = {
+            "id": object_id,
+            "pixels": pixels,
+            "with_depth": len(points) / pixels,
+        }
+        about["new"] = object_id not in before.object_ids
+        size, distance = "no depth", ""
         if len(points):
-            extents = np.ptp(points, axis=0) * 100
-            size = " x ".join(f"{extent:.1f}" for extent in extents)
-            distance = f"{float(np.median(points[:, 2])) * 100:.0f}"
-        new = "" if object_id in before.object_ids else "  new"
+            about["extents"] = np.ptp(points, axis=0).tolist()
+            about["distance"] = float(np.median(points[:, 2]))
+            size = " x ".join(f"{extent * 100:.1f}" for extent in about["extents"])
+            distance = f"{about['distance'] * 100:.0f}"
+        new = "  new" if about["new"] else ""
         share = f"{100 * len(points) / pixels:.0f} %"
         click.echo(f"  {object_id:<3} {pixels:>6}  {share:>10}  {size:<26}  {distance:>12}{new}")
+        told.append(about)
+    return told

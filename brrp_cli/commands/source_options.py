@@ -4,15 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import wraps
+from functools import cache, wraps
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
+from brrp_cli.errors import FrameError
+from brrp_cli.files import exists
+
 if TYPE_CHECKING:
     from brrp_cli.config.segmentation import SegmentConfig
+    from brrp_cli.frames.format import Request
     from brrp_cli.frames.frame import Frame
+    from brrp_cli.segmentation.prompted.segment_by_prompt import PromptSegmenter
 
 _PATH = click.Path(path_type=Path)
 _OPTIONS = [
@@ -27,10 +32,16 @@ _OPTIONS = [
         "--intrinsics",
         type=_PATH,
         help="JSON: fx, fy and cx, cy (ppx, ppy; x_offset, y_offset), a 3 x 3 K, a ROS "
-        "camera_info.",
+        "camera_info; or GraspNet's meta.mat.",
     ),
     click.option("--masks", type=_PATH, help="Object ids: grey PNG or .npy, 0 = background."),
+    click.option(
+        "--camera-pose",
+        type=_PATH,
+        help="T_world_cam, camera to world, metres: 4 x 4 as JSON, .npy or text.",
+    ),
     click.option("--index", metavar="N|NAME", help="Which frame, where SOURCE holds many."),
+    click.option("--list", "lists", is_flag=True, help="Say what SOURCE holds, and do no more."),
     click.option("--color-topic", help="Of a ROS bag, where several would do."),
     click.option("--depth-topic", help="Of a ROS bag; aligned to the colour camera."),
     click.option("--depth-scale", type=float, help="Metres that one unit of depth is."),
@@ -47,19 +58,30 @@ _OPTIONS = [
 
 def source_options(function: Callable[..., Any]) -> Callable[..., Any]:
     """Add the options; they reach the command as its keyword `source`, a `SourceOptions`."""
-    names = ["color", "depth", "intrinsics", "masks", "index", "color_topic", "depth_topic"]
-    names += ["depth_scale", "prompt", "masks_dir"]
+    names = ["color", "depth", "intrinsics", "masks", "camera_pose", "index", "color_topic"]
+    names += ["depth_topic", "depth_scale", "prompt", "masks_dir"]
 
     # Its help, and the options that decorators below have left there, come along.
     @wraps(function)
     def command(**values: Any) -> Any:
         options = SourceOptions(values.pop("path"), **{name: values.pop(name) for name in names})
+        if values.pop("lists"):
+            from brrp_cli.commands.source_list import print_list
+
+            return print_list(options, as_json=values.get("as_json", False))
         return function(source=options, **values)
 
     wrapped: Callable[..., Any] = command
     for option in reversed(_OPTIONS):
         wrapped = option(wrapped)
     return click.argument("path", metavar="[SOURCE]", type=_PATH, required=False)(wrapped)
+
+
+def require_output(output: Path | None) -> Path:
+    """What -o names. UsageError without it, which only --list does without."""
+    if output is None:
+        raise click.UsageError("Missing option '-o' / '--output'.")
+    return output
 
 
 @dataclass(frozen=True)
@@ -71,6 +93,7 @@ class SourceOptions:
     depth: Path | None = None
     intrinsics: Path | None = None
     masks: Path | None = None
+    camera_pose: Path | None = None
     index: str | None = None
     color_topic: str | None = None
     depth_topic: str | None = None
@@ -93,6 +116,10 @@ class SourceOptions:
             raise click.UsageError("--masks and --prompt exclude each other")
         if self.masks_dir is not None and self.prompt is None:
             raise click.UsageError("--masks-dir goes with --prompt")
+        for path in (self.path, self.color, self.depth, self.intrinsics, self.masks):
+            # Told before what takes long to import.
+            if path is not None and not exists(path):
+                raise FrameError("No such file or folder", where=path, fix="check the path")
 
     @property
     def name(self) -> Path:
@@ -100,25 +127,45 @@ class SourceOptions:
         origin = self.path or self.color or Path("frame")
         return origin.with_name(origin.stem if origin.is_file() else origin.resolve().name)
 
-    def read(self) -> Frame:
-        """The frame, with the masks that it comes with. Errors: FrameError."""
+    @property
+    def request(self) -> Request:
+        """What is asked for beside the path."""
         from brrp_cli.frames.format import Request
+
+        return Request(
+            index=self.index,
+            depth_scale=self.depth_scale,
+            intrinsics=self.intrinsics,
+            color_topic=self.color_topic,
+            depth_topic=self.depth_topic,
+        )
+
+    def read(self) -> Frame:
+        """The frame, with the masks that it comes with, and the pose that was named or else is
+        there. Errors: FrameError."""
+        from dataclasses import replace
+
         from brrp_cli.frames.images import read_images
+        from brrp_cli.frames.pose_file import read_pose
         from brrp_cli.frames.readers import read_frame
 
+        pose = None if self.camera_pose is None else read_pose(self.camera_pose)
         if self.path is not None:
-            request = Request(
-                index=self.index,
-                depth_scale=self.depth_scale,
-                intrinsics=self.intrinsics,
-                color_topic=self.color_topic,
-                depth_topic=self.depth_topic,
+            frame = read_frame(self.path, request=self.request)
+        else:
+            assert self.color is not None and self.depth is not None
+            assert self.intrinsics is not None
+            frame = read_images(
+                self.color, self.depth, self.intrinsics, self.masks, depth_scale=self.depth_scale
             )
-            return read_frame(self.path, request=request)
-        assert self.color is not None and self.depth is not None and self.intrinsics is not None
-        return read_images(
-            self.color, self.depth, self.intrinsics, self.masks, depth_scale=self.depth_scale
-        )
+        return frame if pose is None else replace(frame, T_world_cam=pose)
+
+    def names(self) -> list[str]:
+        """The frames of SOURCE, as --index names them. Errors: FrameError."""
+        from brrp_cli.frames.readers import list_frames
+
+        assert self.path is not None
+        return list_frames(self.path, self.request)
 
     def make_masks(self, frame: Frame, seed: int, config: SegmentConfig | None = None) -> Frame:
         """The frame with masks made anew: by the prompt where there is one, else without a model.
@@ -131,7 +178,14 @@ class SourceOptions:
 
         if self.prompt is None:
             return replace(frame, segmap=segment(frame, seed, config))
-        from brrp_cli.segmentation.prompted.segment_by_prompt import PromptSegmenter
+        return replace(
+            frame, segmap=_prompt_segmenter(self.masks_dir, config)(frame, self.prompt, seed)
+        )
 
-        segmenter = PromptSegmenter(self.masks_dir, config)
-        return replace(frame, segmap=segmenter(frame, self.prompt, seed))
+
+@cache
+def _prompt_segmenter(masks_dir: Path | None, config: SegmentConfig | None) -> PromptSegmenter:
+    """Its models are loaded once for all frames of a command."""
+    from brrp_cli.segmentation.prompted.segment_by_prompt import PromptSegmenter
+
+    return PromptSegmenter(masks_dir, config)

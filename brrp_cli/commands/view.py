@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from brrp_cli.commands.results_folder import require_results
 from brrp_cli.progress import note
 
 if TYPE_CHECKING:
@@ -23,7 +24,7 @@ PAGE = "view.html"
     "--output",
     metavar="PAGE.html",
     type=click.Path(path_type=Path),
-    help=f"[default: OUT/{PAGE}]",
+    help=f"File to write. [default: OUT/{PAGE}]",
 )
 @click.option("--open/--no-open", "open_it", default=True, help="Open the page in a browser.")
 @click.option(
@@ -48,11 +49,14 @@ def command(
       brrp view out/ --no-open -o page.html
       brrp view out/ --rerun
     """
-    from brrp_cli.api import open_result
     from brrp_cli.files import refuse_existing
 
     if output is not None:
         refuse_existing(output, overwrite=overwrite)
+    require_results(results)
+
+    from brrp_cli.api import open_result
+
     stored = open_result(results)
     if rerun:
         from brrp_cli.view.rerun import show

@@ -71,8 +71,8 @@ def make_scene(seed: int) -> DemoScene:
     colours = [*(shape.color for shape in shapes), TABLE_COLOUR, FLOOR_COLOUR]
     ids = np.where((sight.index >= 0) & (sight.index < len(meshes)), sight.index + 1, 0)
     frame = make_frame(
-        shade(sight, colours, T_cam_world[:3, :3] @ LIGHT_WORLD),
-        ids,
+        rgb=shade(sight, colours, T_cam_world[:3, :3] @ LIGHT_WORLD),
+        segmap=ids,
         depth=add_depth_noise(sight.depth, INTRINSICS, child_rng(seed, "demo noise")),
         K=INTRINSICS,
         T_world_cam=T_world_cam,

@@ -13,7 +13,9 @@ from numpy.typing import ArrayLike, NDArray
 from brrp_cli.errors import FrameError
 from brrp_cli.frames.camera import check_intrinsics, check_pose, fit_intrinsics
 from brrp_cli.frames.frame import Frame
+from brrp_cli.frames.misplaced import advice, swapped
 from brrp_cli.geometry import backproject
+from brrp_cli.spoken import option
 
 log = logging.getLogger(__name__)
 
@@ -28,9 +30,9 @@ _GREY = 128
 
 
 def make_frame(
-    rgb: ArrayLike | None,
-    segmap: ArrayLike | None,
     *,
+    rgb: ArrayLike | None = None,
+    segmap: ArrayLike | None = None,
     depth: ArrayLike | None = None,
     K: ArrayLike | None = None,
     xyz: ArrayLike | None = None,
@@ -40,6 +42,9 @@ def make_frame(
     files: Mapping[str, Path] | None = None,
 ) -> Frame:
     """Check one camera's arrays and make a frame of them. The arrays are copied, never changed.
+
+    All arguments go by name, and an array under another's name is told: colour and depth that are
+    swapped would make a frame of nothing.
 
     Parameters
     ----------
@@ -58,6 +63,14 @@ def make_frame(
     Errors: FrameError, which names the array, what was expected and what was found.
     """
     where = {name: (files or {}).get(name, source) for name in ("rgb", "segmap", "depth", "K")}
+    if depth is not None and segmap is not None and swapped(depth, segmap, MAX_OBJECTS):
+        raise FrameError(
+            "depth and segmap seem to be swapped",
+            where=where["depth"],
+            expected="depth with many values; segmap with few, which are whole",
+            found=f"depth {_told(np.asarray(depth))}, segmap {_told(np.asarray(segmap))}",
+            fix=f"swap {option('depth')} and {option('masks') if files else 'segmap'}",
+        )
     if depth is not None:
         if K is None:
             raise FrameError(
@@ -98,9 +111,14 @@ def require_objects(frame: Frame) -> Frame:
             where=frame.source,
             expected="at least one pixel that is not 0",
             found="0 (background) everywhere",
-            fix="find the objects with `brrp frame SOURCE --segment -o FRAME.npz`",
+            fix="find the objects with `brrp frame SOURCE --segment -o FRAME.npz`, in Python with"
+            " segment(frame)",
         )
     return frame
+
+
+def _told(array: NDArray[Any]) -> str:
+    return f"of {array.dtype} with {len(np.unique(array))} values"
 
 
 def _numbers(array: NDArray[Any], name: str, source: Path | None) -> None:
@@ -126,7 +144,20 @@ def _depth_metres(raw: NDArray[Any], scale: float | None, source: Path | None) -
         raw = raw[..., 0]
     if raw.ndim != 2:
         raise FrameError(
-            "depth has the wrong shape", where=source, expected="(H, W)", found=raw.shape
+            "depth has the wrong shape",
+            where=source,
+            expected="(H, W)",
+            found=f"{raw.shape}, {raw.dtype}",
+            fix=advice("depth", raw),
+        )
+    if scale is None and raw.dtype in (np.uint8, np.bool_):
+        raise FrameError(
+            "depth has one byte a pixel, which is too coarse for depth",
+            where=source,
+            expected="floats in metres, or 16-bit integers in millimetres",
+            found=f"{raw.dtype}, {raw.min()} to {raw.max()}" if raw.size else raw.dtype,
+            fix=f"if these are masks, pass them as segmap; else say the unit with"
+            f" {option('depth_scale')}",
         )
     _numbers(raw, "depth", source)
     return _scaled(raw, raw, "depth", scale, source)
@@ -135,7 +166,11 @@ def _depth_metres(raw: NDArray[Any], scale: float | None, source: Path | None) -
 def _points_metres(raw: NDArray[Any], scale: float | None, source: Path | None) -> NDArray[Any]:
     if raw.ndim != 3 or raw.shape[-1] != 3:
         raise FrameError(
-            "xyz has the wrong shape", where=source, expected="(H, W, 3)", found=raw.shape
+            "xyz has the wrong shape",
+            where=source,
+            expected="(H, W, 3)",
+            found=f"{raw.shape}, {raw.dtype}",
+            fix=advice("xyz", raw),
         )
     _numbers(raw, "xyz", source)
     points = _scaled(raw, raw[..., 2], "xyz", scale, source)
@@ -187,19 +222,20 @@ def _scaled(
             where=source,
             expected=f"a median depth of {NEAREST_MEDIAN} to {FARTHEST_MEDIAN:g} m",
             found=f"median {median:.6g} m ({raw.dtype}, {unit})",
-            fix="say what one unit is: --depth-scale 0.001 (Python: depth_scale=0.001) for"
-            " millimetres, 0.0002 for TUM's 5000 to the metre",
+            fix=f"say what one unit is: {option('depth_scale', 0.001)} for millimetres, 0.0002 for"
+            " TUM's 5000 to the metre",
         )
     if not USUAL_MEDIAN[0] <= median <= USUAL_MEDIAN[1]:
         log.warning(
             "%s: the median depth is %.3g m (%s, %s), which is unusual for a table: suspect the"
-            " unit, and say what one unit of depth is with --depth-scale",
+            " unit, and say what one unit of depth is with %s",
             source or "The frame",
             median,
             raw.dtype,
             "x depth scale"
             if scale is not None
             else ("as millimetres" if integers else "as metres"),
+            option("depth_scale"),
         )
     with np.errstate(over="ignore", invalid="ignore"):
         metres = (raw.astype(np.float64) * factor).astype(np.float32)
@@ -217,13 +253,21 @@ def _scaled(
 
 def _colour(rgb: ArrayLike, source: Path | None) -> NDArray[np.uint8]:
     colour = np.asarray(rgb)
+    if colour.ndim != 3 or colour.shape[-1] != 3:
+        raise FrameError(
+            "rgb has the wrong shape",
+            where=source,
+            expected="(H, W, 3)",
+            found=f"{colour.shape}, {colour.dtype}",
+            fix=advice("rgb", colour),
+        )
     if colour.dtype != np.uint8:
         raise FrameError(
             "rgb has the wrong type",
             where=source,
             expected="uint8, 0 to 255",
             found=colour.dtype,
-            fix="floats from 0 to 1: (rgb * 255).astype(np.uint8)",
+            fix="floats from 0 to 1: (rgb * 255).astype(np.uint8); points: pass them as xyz",
         )
     return colour
 
@@ -241,6 +285,7 @@ def _masks(segmap: ArrayLike, source: Path | None) -> NDArray[np.int64]:
             where=source,
             expected="(H, W) whole numbers, 0 = background",
             found=f"shape {ids.shape}, dtype {ids.dtype}",
+            fix=advice("segmap", ids),
         )
     ids = ids.astype(np.int64)
     objects = len(np.unique(ids))

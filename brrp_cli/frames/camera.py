@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brrp_cli.errors import FrameError
+from brrp_cli.frames.misplaced import advice
 
 log = logging.getLogger(__name__)
 
@@ -35,7 +36,13 @@ def check_intrinsics(
         return FrameError(what, where=source, expected=_EXPECTED_K, found=found, fix=fix)
 
     if K.shape != (3, 3):
-        raise FrameError("K has the wrong shape", where=source, expected=(3, 3), found=K.shape)
+        raise FrameError(
+            "K has the wrong shape",
+            where=source,
+            expected=(3, 3),
+            found=K.shape,
+            fix=advice("K", K),
+        )
     if K.dtype.kind not in "iuf" or not np.isfinite(K).all():
         raise refuse("K does not hold finite numbers")
     K = K.astype(np.float64)
@@ -92,7 +99,7 @@ def check_pose(T: NDArray[Any], source: Path | None) -> NDArray[np.float64]:
             where=source,
             expected="(4, 4): rotation, translation in metres, last row 0 0 0 1",
             found=np.array2string(T, separator=", ", precision=4).replace("\n", ""),
-            fix="transpose it if it was written column by column",
+            fix=advice("T_world_cam", T) or "transpose it if it was written column by column",
         )
     return T.astype(np.float64)
 

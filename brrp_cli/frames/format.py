@@ -53,6 +53,9 @@ class Format:
     title : as messages name it; layout : the files that tell it
     matches : whether a path looks like it, by names alone
     read : the frame, without masks where the format has none. Errors: FrameError
+    names : the frames of a source that may hold many, as `Request.index` names them, in their
+        order; None for a format of one frame. Errors: FrameError
+    contents : what else is in it, a line each, for `--list`. Errors: FrameError
     last : counts only where no other format matches
     """
 
@@ -60,6 +63,8 @@ class Format:
     layout: str
     matches: Callable[[Path], bool]
     read: Callable[[Path, Request], Frame]
+    names: Callable[[Path, Request], list[str]] | None = None
+    contents: Callable[[Path, Request], list[str]] | None = None
     last: bool = False
 
 

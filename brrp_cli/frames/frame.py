@@ -14,7 +14,7 @@ from brrp_cli.errors import FrameError
 BACKGROUND = 0
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Frame:
     """What the camera saw and which pixel belongs to which object.
 
@@ -60,6 +60,12 @@ class Frame:
                 value = value.copy()
                 value.setflags(write=False)
                 object.__setattr__(self, name, value)
+
+    def __repr__(self) -> str:
+        """Sizes, without the arrays."""
+        height, width = self.shape
+        source = "" if self.source is None else f", {self.source}"
+        return f"Frame({width} x {height}, {len(self.object_ids)} objects{source})"
 
     @property
     def shape(self) -> tuple[int, int]:

@@ -12,6 +12,7 @@ from brrp_cli.frames.build import make_frame
 from brrp_cli.frames.frame import Frame
 from brrp_cli.frames.intrinsics import Intrinsics, read_intrinsics
 from brrp_cli.frames.pixels import read_colour, read_depth, read_masks
+from brrp_cli.spoken import option
 
 log = logging.getLogger(__name__)
 
@@ -47,10 +48,12 @@ def read_images(
     if camera.shape is not None:
         _same_size(shape, camera.shape, intrinsics)
     if depth_scale is None and raw.dtype.kind in "iu":
-        _millimetres(camera, intrinsics)
+        depth_scale = camera.metres_per_unit
+        if depth_scale is None:
+            _millimetres(camera, intrinsics)
     frame = make_frame(
-        rgb,
-        ids,
+        rgb=rgb,
+        segmap=ids,
         depth=raw,
         K=camera.K,
         depth_scale=depth_scale,
@@ -59,10 +62,11 @@ def read_images(
     )
     unit = "millimetres" if raw.dtype.kind in "iu" else "metres"
     log.info(
-        "Depth: %s, taken as %s (median %.2f m); --depth-scale says otherwise",
+        "Depth: %s, taken as %s (median %.2f m); %s says otherwise",
         raw.dtype,
         unit if depth_scale is None else f"units of {depth_scale:g} m",
         float(np.median(frame.points[frame.valid][:, 2])),
+        option("depth_scale"),
     )
     return frame
 
@@ -83,8 +87,9 @@ def _millimetres(camera: Intrinsics, path: Path) -> None:
         raise FrameError(
             "The intrinsics hold a depth_scale whose unit they do not tell",
             where=path,
-            expected="--depth-scale: how many metres one unit of depth is",
+            expected=f"{option('depth_scale')}: how many metres one unit of depth is",
             found=f"depth_scale {camera.depth_scale:g}",
-            fix=f"--depth-scale {camera.depth_scale:g} if it is in metres (RealSense),"
-            f" --depth-scale {camera.depth_scale / 1000:g} if it is in millimetres (BOP)",
+            fix=f"{option('depth_scale', f'{camera.depth_scale:g}')} if it is in metres"
+            f" (RealSense), {option('depth_scale', f'{camera.depth_scale / 1000:g}')} if it is in"
+            " millimetres (BOP)",
         )

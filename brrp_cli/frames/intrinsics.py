@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from brrp_cli.errors import FrameError
 from brrp_cli.files import parse_json
 from brrp_cli.frames.arrays import check_file
+from brrp_cli.frames.mat import read_meta
 
 log = logging.getLogger(__name__)
 
@@ -32,11 +33,13 @@ class Intrinsics:
     """K (3, 3), pixels; the (H, W) it is for and its depth_scale, where the file has them.
 
     depth_scale stands as it was written: its unit differs from one maker of such files to another.
+    metres_per_unit : of depth, where the file leaves no doubt (a meta.mat)
     """
 
     K: NDArray[np.float64]
     shape: tuple[int, int] | None
     depth_scale: float | None
+    metres_per_unit: float | None = None
 
 
 def _number(value: object, key: str, path: Path) -> float:
@@ -84,15 +87,18 @@ def _matrix(data: dict[str, Any], path: Path) -> NDArray[np.float64] | None:
 
 
 def read_intrinsics(path: Path) -> Intrinsics:
-    """Intrinsics from JSON.
+    """Intrinsics from JSON, or from a meta.mat of GraspNet.
 
-    Understood: fx, fy with cx, cy, with ppx, ppy (RealSense) or with x_offset, y_offset; a 3 x 3
-    `K`, nested or flat; a ROS camera_info as JSON; BOP's cam_K; Open3D's intrinsic_matrix. Any of
-    them may stand under a key such as `color` or `intrinsics` when that is the only one.
+    Understood in JSON: fx, fy with cx, cy, with ppx, ppy (RealSense) or with x_offset, y_offset;
+    a 3 x 3 `K`, nested or flat; a ROS camera_info as JSON; BOP's cam_K; Open3D's intrinsic_matrix.
+    Any of them may stand under a key such as `color` or `intrinsics` when that is the only one.
 
     Errors: FrameError if the file is no JSON or lacks them.
     """
     check_file(path)
+    if path.suffix == ".mat":
+        meta = read_meta(path)
+        return Intrinsics(meta.K, None, None, meta.depth_scale)
     try:
         data = parse_json(path.read_text(encoding="utf-8"))
     except (ValueError, OSError) as error:

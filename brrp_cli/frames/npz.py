@@ -49,8 +49,8 @@ def load_frame(path: str | Path, *, depth_scale: float | None = None, masks: boo
     if K is not None and K.shape == (9,):  # contact_graspnet takes it flat too
         K = K.reshape(3, 3)
     frame = make_frame(
-        arrays.get("rgb"),
-        arrays.get("segmap", arrays.get("seg")),
+        rgb=arrays.get("rgb"),
+        segmap=arrays.get("segmap", arrays.get("seg")),
         depth=arrays["depth"] if has_depth else None,
         K=K,
         xyz=None if has_depth else arrays["xyz"],

@@ -58,8 +58,8 @@ def read_published(folder: str | Path, *, depth_scale: float | None = None) -> F
             found=f"shape {buffer.shape}, {buffer.min():g} to {buffer.max():g}",
         )
     return make_frame(
-        read_colour(rgb),
-        _objects_only(ids, folder.parent / "objects.json"),
+        rgb=read_colour(rgb),
+        segmap=_objects_only(ids, folder.parent / "objects.json"),
         depth=depth_from_buffer(buffer, projection),
         K=intrinsics_from_projection(projection, buffer.shape),
         T_world_cam=np.linalg.inv(view) @ _T_GL_CAM,

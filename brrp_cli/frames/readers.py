@@ -23,8 +23,8 @@ def known_formats() -> tuple[Format, ...]:
 
 def matching(path: Path) -> list[Format]:
     """The formats that the path may be of."""
-    found = [one for one in known_formats() if one.matches(path)]
-    return [one for one in found if not one.last] or found
+    found = [one for one in known_formats() if not one.last and one.matches(path)]
+    return found or [one for one in known_formats() if one.last and one.matches(path)]
 
 
 def read_frame(
@@ -37,13 +37,29 @@ def read_frame(
 
     Errors: FrameError, with the formats that are known where the path is of none or of several.
     """
-    path = Path(path)
     request = request or Request(depth_scale=depth_scale)
+    return format_of(Path(path)).read(Path(path), request)
+
+
+def list_frames(path: str | Path, request: Request | None = None) -> list[str]:
+    """The frames of a source, as `Request.index` names them, in their order.
+
+    A source of one frame has one, by the name of its file or folder. Errors: as of `read_frame`.
+    """
+    path = Path(path)
+    found = format_of(path)
+    if found.names is None:
+        return [path.resolve().stem if path.is_file() else path.resolve().name]
+    return found.names(path, request or Request())
+
+
+def format_of(path: Path) -> Format:
+    """The one format that the path is of. Errors: FrameError, as of `read_frame`."""
     if not path.exists():
         raise FrameError("No such file or folder", where=path, fix="check the path")
     found = matching(path)
     if len(found) == 1:
-        return found[0].read(path, request)
+        return found[0]
     if found:
         raise FrameError(
             "The path may be of several formats",

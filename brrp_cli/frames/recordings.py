@@ -22,16 +22,21 @@ def recording(title: str, intrinsics: str, unit: str) -> Format:
 
     def read(folder: Path, request: Request) -> Frame:
         """The frame that --index names or counts, the first else. Errors: FrameError."""
-        colours = images_in(folder / "color", COLOUR_ENDINGS)
-        pairs = by_name(colours, images_in(folder / "depth", DEPTH_ENDINGS))
-        return read_pair(pairs, folder / intrinsics, request, folder, unit)
+        return read_pair(pairs_below(folder), folder / intrinsics, request, folder, unit)
 
     return Format(
         title=title,
         layout=f"color/, depth/, {intrinsics}",
         matches=lambda path: (path / intrinsics).is_file() and (path / "color").is_dir(),
         read=read,
+        names=lambda path, request: list(pairs_below(path)),
     )
+
+
+def pairs_below(folder: Path, color: str = "color") -> dict[str, tuple[Path, Path]]:
+    """Name -> (colour, depth) of the images in the folders `color` and depth/."""
+    colours = images_in(folder / color, COLOUR_ENDINGS)
+    return by_name(colours, images_in(folder / "depth", DEPTH_ENDINGS))
 
 
 def images_in(folder: Path, endings: tuple[str, ...]) -> dict[str, Path]:
@@ -60,7 +65,7 @@ def read_pair(
     colour, depth = pairs[pick(names, request.index, names, where)]
     intrinsics = request.intrinsics or intrinsics
     log.info("Frame: %s and %s, intrinsics %s", colour.name, depth.name, intrinsics)
-    if request.depth_scale is None:
+    if request.depth_scale is None and intrinsics.suffix != ".mat":
         log.info("Depth that is integers is millimetres: %s", unit)
     return read_images(colour, depth, intrinsics, depth_scale=request.depth_scale)
 

@@ -93,7 +93,7 @@ def frame_of(color: Any, depth: Any, info: Any, *, depth_scale: float | None = N
             fix="align depth to colour: realsense2_camera align_depth.enable:=true and its topic"
             " aligned_depth_to_color; depth_image_proc/register for others",
         )
-    return make_frame(rgb, None, depth=raw, K=intrinsics_of(info), depth_scale=depth_scale)
+    return make_frame(rgb=rgb, depth=raw, K=intrinsics_of(info), depth_scale=depth_scale)
 
 
 def _size(info: Any) -> tuple[int, int]:

@@ -28,6 +28,7 @@ class Setup:
     config : one of its presets, or a changed one; device : "auto", "cpu" or "cuda"
     prior, retriever, weights : only where the method uses them
     workers : objects at a time; None = as many as there are cores. Results do not depend on it
+    only : the ids that are asked for, for a method that works `object_by_object`; None = all
     """
 
     config: Any
@@ -37,6 +38,7 @@ class Setup:
     retriever: Retriever | None = None
     weights: Path | None = None
     workers: int | None = None
+    only: frozenset[int] | None = None
 
 
 def _no_posteriors() -> tuple[type[StoredPosterior], ...]:
@@ -56,6 +58,7 @@ class Method:
     check_prior : PriorError unless it can work with that prior, before any work is done
     describe_weights : reads what a file of weights says of its training; None for a method that
         is not trained. Errors: WeightsError
+    object_by_object : whether it does no work for ids that `Setup.only` leaves out
     gives_shapes : whether it reconstructs, or is there to be measured alone
     """
 
@@ -69,6 +72,7 @@ class Method:
     check_prior: Callable[[Prior, Any], None] | None = None
     describe_weights: Callable[[Path], dict[str, Any]] | None = None
     uses_cuda: bool = False
+    object_by_object: bool = False
     gives_shapes: bool = True
 
     @property

@@ -67,7 +67,7 @@ def run(frame: Frame, setup: Setup) -> Reconstruction:
             return too_few(object_id, scene.too_few[object_id], config.observation.min_points)
         return with_surface(object_id, partial(one, scene.objects[object_id]), config.surface)
 
-    ids = frame.object_ids
+    ids = [i for i in frame.object_ids if setup.only is None or i in setup.only]
     return Reconstruction(
         frame=frame,
         objects=list(progress(in_threads(whole, ids, workers), "objects", len(ids))),
@@ -107,4 +107,5 @@ METHOD = Method(
     uses_retriever=True,
     check_prior=_check_prior,
     uses_cuda=True,
+    object_by_object=True,
 )

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from brrp_cli.frames.frame import Frame
 from brrp_cli.reconstruction import ObjectReconstruction
+from brrp_cli.rendering.framing import near_others, shown_whole
 from brrp_cli.rendering.render import View, fitted, render, view_from_behind
 from brrp_cli.segmentation.mask_picture import draw_masks, object_colours
 from brrp_cli.surface.colours import (
@@ -25,6 +26,8 @@ Picture = NDArray[np.uint8]
 
 PANEL_WIDTH = 480
 CAPTION = 28
+SMALLEST = 8  # type of the list
+INDENT = 26  # pixels, of the list's text
 INK = (30, 30, 30)
 IMAGE_UP = np.array([0.0, -1.0, 0.0])
 NOT_STORED = "none of them"
@@ -47,7 +50,7 @@ def preview(
     found = [o for o in objects if o.surface is not None]
     surfaces = [o.surface for o in found if o.surface is not None]
     up = IMAGE_UP if up is None else up
-    behind = fitted(view_from_behind(view, _middle(objects), up), surfaces)
+    behind = fitted(view_from_behind(view, _middle(objects), up), shown_whole(surfaces))
     top = scale_top(surfaces)
     unsure = [spread_colours(spread(s), top) for s in surfaces]
     shapes = [
@@ -85,8 +88,8 @@ def _panel_view(frame: Frame) -> View:
 
 
 def _middle(objects: Sequence[ObjectReconstruction]) -> NDArray[np.float64]:
-    centers = [o.center for o in objects if o.center is not None]
-    return np.mean(centers, axis=0) if centers else np.array([0.0, 0.0, 1.0])
+    centers = np.array([o.center for o in objects if o.center is not None])
+    return centers[near_others(centers)].mean(axis=0) if len(centers) else np.array([0.0, 0.0, 1.0])
 
 
 def _resized(picture: Picture, shape: tuple[int, int]) -> Picture:
@@ -111,23 +114,58 @@ def _captioned(picture: Picture, text: str) -> Picture:
 
 
 def _listing(objects: Sequence[ObjectReconstruction], shape: tuple[int, int]) -> Picture:
-    """Two lines for each object: id, status and weights in the posterior; what was retrieved."""
+    """For each object id, status and weights in the posterior, and what was retrieved; long lines
+    are wrapped, in the largest type in which all of them fit."""
     from PIL import Image, ImageDraw
 
     height, width = shape
     panel = Image.new("RGB", (width, height), "white")
     draw = ImageDraw.Draw(panel)
-    line = min(44, (height - 8) // max(len(objects), 1))
-    size = max(8, min(13, line // 2 - 3))
+    told = [_told(item) for item in objects]
+    for size in range(13, SMALLEST - 1, -1):
+        font, line = _font(size), size + 4
+        blocks = [
+            [row for text in pair for row in wrapped(text, font, width - INDENT - 6)]
+            for pair in told
+        ]
+        rows = (height - 6) // line
+        if sum(map(len, blocks)) <= rows:
+            break
+    else:  # too much for any type: every object has its share of the rows
+        blocks = [_first(block, max(1, rows // len(blocks))) for block in blocks]
+    gap = (height - 6 - line * sum(map(len, blocks))) // max(len(blocks), 1)
+    gap = max(0, min(8, gap))
     colours = object_colours([item.object_id for item in objects])
-    for row, item in enumerate(objects):
-        y = 6 + row * line
-        colour = tuple(int(c) for c in colours[item.object_id])
-        draw.rectangle((8, y, 20, y + 12), fill=colour)
-        first, second = _told(item)
-        draw.text((26, y), first, fill=INK, font=_font(size))
-        draw.text((26, y + line // 2 - 2), second, fill=INK, font=_font(size))
+    y = 4
+    for item, block in zip(objects, blocks, strict=True):
+        draw.rectangle((8, y + 1, 20, y + 13), fill=tuple(int(c) for c in colours[item.object_id]))
+        for row in block:
+            draw.text((INDENT, y), row, fill=INK, font=font)
+            y += line
+        y += gap
     return np.asarray(panel)
+
+
+def _first(rows: list[str], count: int) -> list[str]:
+    return rows if len(rows) <= count else [*rows[: count - 1], rows[count - 1][:-3] + "..."]
+
+
+def wrapped(text: str, font: Any, width: int) -> list[str]:
+    """The text in rows of at most `width` pixels, broken between words, and within a word that is
+    wider than a row."""
+    rows = [""]
+    for word in text.split(" "):
+        longer = f"{rows[-1]} {word}".strip()
+        if font.getlength(longer) <= width:
+            rows[-1] = longer
+            continue
+        if rows[-1]:
+            rows.append("")
+        for letter in word:
+            if font.getlength(rows[-1] + letter) > width and rows[-1]:
+                rows.append("")
+            rows[-1] += letter
+    return rows
 
 
 def _told(item: ObjectReconstruction) -> tuple[str, str]:

@@ -18,21 +18,23 @@ from brrp_cli.files import parse_json
 from brrp_cli.frames.frame import Frame
 from brrp_cli.frames.npz import load_frame
 from brrp_cli.geometry import transform_points
+from brrp_cli.notebook import picture_html, result_html
 from brrp_cli.observation.support_plane import Plane
 from brrp_cli.reconstruction import StoredPosterior, Surface
-from brrp_cli.results.write import FRAME, POSTERIOR, RECORD, SCHEMA, mesh_name
+from brrp_cli.results.write import FRAME, POSTERIOR, PREVIEW, RECORD, SCHEMA, mesh_name
 
 if TYPE_CHECKING:
     import trimesh
 
 INSIDE_DEMO = "result"
+PREVIEW_WIDTH = 1200  # pixels in a notebook
 AGAIN = "run `brrp reconstruct` again"
 
 # From the path of posterior.h5 to posteriors by object id.
 OpenPosterior = Callable[[Path], dict[int, StoredPosterior]]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class StoredResult:
     """What `write_results` wrote.
 
@@ -45,6 +47,20 @@ class StoredResult:
     folder: Path
     record: dict[str, Any]
     open_posterior: OpenPosterior
+
+    def __repr__(self) -> str:
+        """Where it lies and how many objects it has, without the record."""
+        made = sum(item["mesh"] is not None for item in self.record["objects"])
+        return (
+            f"StoredResult({self.folder}: {made} of {len(self.object_ids)} objects,"
+            f" {self.record['method']})"
+        )
+
+    def _repr_html_(self) -> str:
+        """For notebooks: preview.png."""
+        path = self.folder / PREVIEW
+        picture = picture_html(path.read_bytes(), PREVIEW_WIDTH) if path.is_file() else ""
+        return result_html(repr(self), picture)
 
     @cached_property
     def T_frame_cam(self) -> NDArray[np.float64]:

@@ -34,6 +34,7 @@ SCHEMA = 1
 RECORD = "result.json"
 FRAME = "frame.npz"
 POSTERIOR = "posterior.h5"
+PREVIEW = "preview.png"
 # Metres; vertices are single precision, which has steps of a tenth of a millimetre there.
 FARTHEST_ORIGIN = 1000.0
 LIBRARIES = ("torch", "open3d", "numpy", "scipy", "scikit-image", "trimesh", "h5py", "onnxruntime")
@@ -69,7 +70,7 @@ def write_results(
         )
         up = None if result.plane is None else result.plane.normal
         picture = preview(result.frame, result.objects, up=up, caption=caption)
-        Image.fromarray(picture).save(partial / "preview.png")
+        Image.fromarray(picture).save(partial / PREVIEW)
         names = sorted(path.name for path in partial.iterdir())
     return [Path(folder) / name for name in names]
 
@@ -187,16 +188,31 @@ def _object_record(item: ObjectReconstruction, T_target_cam: NDArray[np.float64]
 
 
 def _surface_record(surface: Surface, T_target_cam: NDArray[np.float64]) -> dict[str, Any]:
-    """Axis-aligned box in the frame of the meshes, metres; volume in litres."""
+    """Axis-aligned box in the frame of the meshes, metres; volume in litres; the smallest box."""
     vertices = transform_points(T_target_cam, surface.vertices)
     low, high = vertices.min(axis=0), vertices.max(axis=0)
     return {
         "center": ((low + high) / 2).tolist(),
         "extents": (high - low).tolist(),
+        "oriented_box": _oriented_box(vertices),
         "volume_litre": float(surface.as_trimesh().volume * 1000),
         "mean_uncertainty": float(surface.uncertainty.mean()),
         "uncertainty_unit": surface.uncertainty_unit,
     }
+
+
+def _oriented_box(vertices: NDArray[np.floating]) -> dict[str, Any]:
+    """The smallest box around (n, 3) vertices: its rigid pose, from the box's middle and axes to
+    the frame of the vertices, and its extents along these axes, longest first, metres."""
+    from trimesh.bounds import oriented_bounds
+
+    T_box_frame, extents = oriented_bounds(vertices)
+    order = np.argsort(-np.asarray(extents), kind="stable")
+    T_frame_box = np.linalg.inv(T_box_frame)
+    axes = T_frame_box[:3, order]
+    axes[:, 2] *= np.sign(np.linalg.det(axes))
+    T_frame_box[:3, :3] = axes
+    return {"T_frame_box": T_frame_box.tolist(), "extents": np.asarray(extents)[order].tolist()}
 
 
 def _retrieved_record(found: Retrieved, T_target_cam: NDArray[np.float64]) -> dict[str, Any]:

@@ -25,12 +25,20 @@ PALETTE = np.array(
     ],
     dtype=np.uint8,
 )
+# The same darker and lighter, where there are more objects than colours.
+_SHADES = ((0.0, 0), (0.45, 0), (0.5, 255))
 _FILL = 0.45
 
 
 def object_colours(object_ids: list[int]) -> dict[int, NDArray[np.uint8]]:
-    """A colour (3,) uint8 for each id, by its place in the list."""
-    return {i: PALETTE[place % len(PALETTE)] for place, i in enumerate(object_ids)}
+    """A colour (3,) uint8 for each id, by its place in the list; 21 of them differ."""
+    return {i: _colour(place) for place, i in enumerate(object_ids)}
+
+
+def _colour(place: int) -> NDArray[np.uint8]:
+    again, number = divmod(place, len(PALETTE))
+    share, towards = _SHADES[again % len(_SHADES)]
+    return np.asarray((1 - share) * PALETTE[number] + share * towards).round().astype(np.uint8)
 
 
 def draw_masks(rgb: NDArray[np.uint8], segmap: NDArray[np.integer]) -> NDArray[np.uint8]:

@@ -11,6 +11,7 @@ from brrp_cli.geometry import transform_points
 from brrp_cli.planning.body import body_axes
 from brrp_cli.planning.scene import upwards
 from brrp_cli.reconstruction import METRES
+from brrp_cli.rendering.framing import shown_whole
 from brrp_cli.results.read import StoredResult
 from brrp_cli.segmentation.mask_picture import object_colours
 from brrp_cli.surface.colours import scale_top, spread_colours, spread_meaning
@@ -53,10 +54,11 @@ def camera(stored: StoredResult) -> dict[str, Any]:
     is seen in them.
 
     T_page_frame : (4, 4) row by row; position : (3,) metres, of the camera; radius : metres, of a
-    ball around all objects; point_size : metres between observed points
+    ball around all objects but those that lie far from the others; point_size : metres between
+    observed points
     """
     frame = stored.frame
-    every = scene_points(stored)
+    every = shown_points(stored)
     middle = (every.min(axis=0) + every.max(axis=0)) / 2
     right, away, up = body_axes(upwards(stored), stored.T_frame_cam[:3, 0]).T
     T_page_frame = np.eye(4)
@@ -72,9 +74,10 @@ def camera(stored: StoredResult) -> dict[str, Any]:
     }
 
 
-def scene_points(stored: StoredResult) -> NDArray[np.float64]:
-    """(n, 3) vertices of all meshes, else all objects' points; metres, frame of the meshes."""
-    vertices = [surface.vertices for surface in stored.surfaces.values()]
+def shown_points(stored: StoredResult) -> NDArray[np.float64]:
+    """(n, 3) vertices of the meshes that lie near the others, else all objects' points; metres,
+    frame of the meshes."""
+    vertices = [surface.vertices for surface in shown_whole(list(stored.surfaces.values()))]
     if not vertices:
         frame = stored.frame
         seen = [frame.object_points(i) for i in frame.object_ids]

@@ -67,7 +67,7 @@ def frame_file(truth, tmp_path_factory) -> Path:
     segmap[230, 10:15] = SPECK
     rgb = np.full((*SHAPE, 3), 128, np.uint8)
     path = tmp_path_factory.mktemp("frame") / "frame.npz"
-    frame = make_frame(rgb, segmap, depth=sight.depth, K=K, T_world_cam=T_world_cam())
+    frame = make_frame(rgb=rgb, segmap=segmap, depth=sight.depth, K=K, T_world_cam=T_world_cam())
     save_frame(frame, path)
     return path
 
@@ -221,7 +221,9 @@ def test_an_existing_folder_is_refused_before_the_work(out, frame_file, prior):
 
 def test_world_needs_to_know_where_the_camera_is(frame_file, prior, tmp_path):
     frame = load_frame(frame_file)
-    bare = make_frame(frame.rgb, frame.segmap, depth=np.nan_to_num(frame.points[..., 2]), K=K)
+    bare = make_frame(
+        rgb=frame.rgb, segmap=frame.segmap, depth=np.nan_to_num(frame.points[..., 2]), K=K
+    )
     save_frame(bare, tmp_path / "bare.npz")
     code, output = run(tmp_path / "bare.npz", "--prior", prior, "--frame", "world")
     assert code == 1 and "T_world_cam" in output
@@ -253,7 +255,7 @@ def test_where_no_object_gets_a_surface_the_record_is_written_all_the_same(
     frame = load_frame(frame_file)
     masks = np.where(frame.segmap == SPECK, SPECK, 0)
     depth = np.nan_to_num(frame.points[..., 2])
-    save_frame(make_frame(frame.rgb, masks, depth=depth, K=K), tmp_path / "speck.npz")
+    save_frame(make_frame(rgb=frame.rgb, segmap=masks, depth=depth, K=K), tmp_path / "speck.npz")
     of_a_prior = () if "vprism" in options else ("--prior", prior)
     code, output = run(tmp_path / "speck.npz", *of_a_prior, *options, "-o", tmp_path / "out")
     assert code == 3

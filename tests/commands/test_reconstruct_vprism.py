@@ -52,7 +52,7 @@ def frame_file(truth, tmp_path_factory) -> Path:
     segmap[170, 20:26] = SPECK
     path = tmp_path_factory.mktemp("frame") / "frame.npz"
     rgb = np.full((*SHAPE, 3), 128, np.uint8)
-    save_frame(make_frame(rgb, segmap, depth=sight.depth, K=K), path)
+    save_frame(make_frame(rgb=rgb, segmap=segmap, depth=sight.depth, K=K), path)
     return path
 
 

@@ -81,7 +81,7 @@ def test_masks_are_kept_unless_asked_for_again(saved, tmp_path):
 
 def test_a_frame_without_masks_gets_some(saved, tmp_path):
     _, frame = saved
-    bare = make_frame(frame.rgb, None, depth=np.nan_to_num(frame.points[..., 2]), K=frame.K)
+    bare = make_frame(rgb=frame.rgb, depth=np.nan_to_num(frame.points[..., 2]), K=frame.K)
     save_frame(bare, tmp_path / "b.npz")
     result = run(tmp_path / "b.npz", "-o", tmp_path / "g.npz")
     assert result.exit_code == 0, result.output

@@ -115,7 +115,7 @@ def test_every_brrp_command_that_is_shown_exists(shown: Shown, arguments: list[s
         "reconstruct frame.npz --k 0",
         "reconstruct one.npz two.npz",
         "build-prior meshes/ --units",
-        "frame --color c.png --depth d.png --intrinsics k.json",
+        "prior merge one/ two/",
         "",
     ],
 )

@@ -111,7 +111,9 @@ def test_any_arrays_become_a_frame_or_a_frame_error(data: st.DataObject) -> None
         given_["xyz"] = data.draw(arrays((*SIZE, 3)))
     with np.errstate(all="ignore"):
         try:
-            frame = make_frame(given_.pop("rgb", None), given_.pop("segmap", None), **given_)
+            frame = make_frame(
+                rgb=given_.pop("rgb", None), segmap=given_.pop("segmap", None), **given_
+            )
         except FrameError as error:
             assert len(str(error)) < 5_000
         else:
@@ -126,7 +128,7 @@ def test_any_arrays_become_a_frame_or_a_frame_error(data: st.DataObject) -> None
 def test_good_types_with_any_numbers_become_a_frame_or_a_frame_error(depth, mask) -> None:
     with np.errstate(all="ignore"):
         try:
-            keeps_its_promises(make_frame(None, mask, depth=depth, K=K))
+            keeps_its_promises(make_frame(segmap=mask, depth=depth, K=K))
         except FrameError:
             return
 
@@ -334,7 +336,7 @@ def test_points_of_which_none_is_whole_are_refused() -> None:
     xyz = np.full((*SIZE, 3), 0.8)
     xyz[..., 0] = np.nan
     with pytest.raises(FrameError, match="no valid pixel"):
-        make_frame(None, None, xyz=xyz)
+        make_frame(xyz=xyz)
 
 
 def test_depth_beyond_a_hundred_metres_is_no_return_and_is_told(
@@ -343,6 +345,6 @@ def test_depth_beyond_a_hundred_metres_is_no_return_and_is_told(
     caplog.set_level(logging.INFO)
     depth = np.full(SIZE, 0.8)
     depth[0, :3] = [101.0, 1e30, 3e38]
-    frame = make_frame(None, None, depth=depth, K=K)
+    frame = make_frame(depth=depth, K=K)
     assert not frame.valid[0, :3].any() and frame.valid.sum() == 45
     assert "3 pixels lie beyond 100 m" in caplog.text

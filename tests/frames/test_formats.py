@@ -102,7 +102,9 @@ def test_a_new_format_is_one_new_file(scene, tmp_path, monkeypatch):
     known_formats.cache_clear()
     try:
         assert_the_scene(read_frame(dump), scene)
-        result = CliRunner().invoke(main, ["frame", str(tmp_path), "-o", str(tmp_path / "f.npz")])
+        (tmp_path / "none").mkdir()
+        arguments = ["frame", str(tmp_path / "none"), "-o", str(tmp_path / "f.npz")]
+        result = CliRunner().invoke(main, arguments)
         assert "my recorder (mine.json)" in result.output, "what is known is listed"
     finally:
         known_formats.cache_clear()

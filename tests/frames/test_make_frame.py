@@ -47,7 +47,7 @@ ZOO = {
     "depth all inf": ({"depth": np.full(SHAPE, np.inf)}, "NaN or inf everywhere"),
     "depth negative": ({"depth": np.full(SHAPE, -0.8)}, "negative depth"),
     "one negative": ({"depth": np.where(np.eye(6, 8), -1, 0.8)}, "negative depth"),
-    "float millimetres": ({"depth": np.full(SHAPE, 800.0)}, "--depth-scale"),
+    "float millimetres": ({"depth": np.full(SHAPE, 800.0)}, r"depth_scale=0\.001"),
     "scale too large": ({"depth_scale": 100.0}, "in another unit"),
     "scale too small": ({"depth_scale": 1e-3}, "in another unit"),
     "scale negative": ({"depth_scale": -1.0}, "no positive number"),
@@ -67,7 +67,7 @@ ZOO = {
     "K normalised": ({"K": matrix(a00=0.2, a11=0.2, a02=0.5, a12=0.5)}, "not in pixels"),
     "no geometry": ({"depth": None}, "Neither depth nor points"),
     "xyz shape": ({"depth": None, "xyz": np.ones((48, 3))}, "xyz has the wrong shape"),
-    "xyz millimetres": ({"depth": None, "K": None, "xyz": POINTS * 1000}, "--depth-scale"),
+    "xyz millimetres": ({"depth": None, "K": None, "xyz": POINTS * 1000}, "depth_scale=0"),
     "xyz behind": ({"depth": None, "K": None, "xyz": -POINTS}, "negative depth"),
     "xyz y up": ({"depth": None, "K": None, "xyz": POINTS * [1, -1, 1]}, "no pinhole"),
     "xyz in world": ({"depth": None, "K": None, "xyz": POINTS[..., ::-1] + 1}, "no pinhole"),
@@ -97,6 +97,50 @@ def test_a_wrong_frame_gets_one_clear_message(name):
     changes, message = ZOO[name]
     with pytest.raises(FrameError, match=message):
         make_frame(**good(**changes))
+
+
+COLOUR = np.zeros((*SHAPE, 3), np.uint8)
+SWAPPED = {
+    "colour as depth": ({"depth": COLOUR, "rgb": None}, "pass it as rgb"),
+    "points as depth": ({"depth": POINTS}, "pass it as xyz"),
+    "depth as points": ({"depth": None, "xyz": np.full(SHAPE, 0.8)}, "pass it as depth"),
+    "depth as colour": ({"rgb": np.full(SHAPE, 0.8)}, "pass it as depth"),
+    "points as colour": ({"rgb": POINTS}, "pass them as xyz"),
+    "colour as masks": ({"segmap": COLOUR}, "pass it as rgb"),
+    "depth as masks": ({"segmap": np.full(SHAPE, 0.85)}, "pass it as depth"),
+    "masks as depth": (
+        {"depth": good()["segmap"], "segmap": np.full(SHAPE, 0.85)},
+        "depth and segmap seem to be swapped",
+    ),
+    "masks of one byte as depth": ({"depth": good()["segmap"].astype("u1")}, "pass them as segmap"),
+    "pose as K": ({"K": np.eye(4)}, "pass it as T_world_cam"),
+    "K as pose": ({"T_world_cam": K}, "pass it as K"),
+    "depth as K": ({"K": np.full(SHAPE, 0.8), "depth": K}, "pass it as depth"),
+    "flat K": ({"K": K.ravel()}, r"reshape it to \(3, 3\)"),
+}
+
+
+@pytest.mark.parametrize("name", SWAPPED)
+def test_an_array_under_anothers_name_is_told(name):
+    changes, message = SWAPPED[name]
+    with pytest.raises(FrameError, match=message) as error:
+        make_frame(**good(**changes))
+    assert "--" not in str(error.value), "there are no options in Python"
+
+
+def test_masks_and_integer_depth_that_are_swapped_are_told():
+    z = (700 + np.arange(2000)).astype(np.uint16).reshape(40, 50)
+    ids = np.zeros((40, 50), np.uint16)
+    ids[5:9, 5:9] = 700
+    camera = np.array([[60.0, 0, 25], [0, 60.0, 20], [0, 0, 1]])
+    assert make_frame(depth=z, segmap=ids, K=camera).object_ids == [700]
+    with pytest.raises(FrameError, match="seem to be swapped"):
+        make_frame(depth=ids, segmap=z, K=camera)
+
+
+def test_arguments_go_by_name_alone():
+    with pytest.raises(TypeError):
+        make_frame(good()["rgb"], good()["segmap"], depth=good()["depth"], K=K)
 
 
 def test_a_mask_without_objects_is_told_how_to_be_mended():

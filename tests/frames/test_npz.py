@@ -47,17 +47,19 @@ def test_a_frame_comes_back_as_it_was(tmp_path_factory, depth, holes, mask, pose
     holes[0, :2], holes[5, 7] = False, False
     mask[3, 3] = 5
     depth = np.where(holes, np.nan, depth)
-    frame = make_frame(RGB, mask, depth=depth, K=K, T_world_cam=np.eye(4) if posed else None)
+    frame = make_frame(
+        rgb=RGB, segmap=mask, depth=depth, K=K, T_world_cam=np.eye(4) if posed else None
+    )
     if as_points:
         bent = frame.points + np.float32(1e-4)
-        frame = make_frame(RGB, mask, xyz=bent, T_world_cam=frame.T_world_cam)
+        frame = make_frame(rgb=RGB, segmap=mask, xyz=bent, T_world_cam=frame.T_world_cam)
     path = tmp_path_factory.mktemp("frames") / "frame.npz"
     save_frame(frame, path)
     assert same(load_frame(path), frame)
 
 
 def test_the_same_frame_is_the_same_bytes(tmp_path):
-    frame = make_frame(RGB, MASK, depth=DEPTH, K=K)
+    frame = make_frame(rgb=RGB, segmap=MASK, depth=DEPTH, K=K)
     save_frame(frame, tmp_path / "a.npz")
     save_frame(frame, tmp_path / "b.npz")
     assert (tmp_path / "a.npz").read_bytes() == (tmp_path / "b.npz").read_bytes()
@@ -236,4 +238,6 @@ def test_a_bare_npy_a_folder_and_nothing_are_refused(tmp_path):
 def test_an_unwritable_place_is_told(tmp_path):
     (tmp_path / "file").write_text("in the way")
     with pytest.raises(OutputError):
-        save_frame(make_frame(RGB, MASK, depth=DEPTH, K=K), tmp_path / "file" / "frame.npz")
+        save_frame(
+            make_frame(rgb=RGB, segmap=MASK, depth=DEPTH, K=K), tmp_path / "file" / "frame.npz"
+        )

@@ -131,7 +131,7 @@ def real_folder(scene, tmp_path):
     """A folder of BRRP's own real scenes."""
     folder = tmp_path / "real"
     folder.mkdir()
-    frame = make_frame(None, None, depth=scene.depth, K=scene.K)
+    frame = make_frame(depth=scene.depth, K=scene.K)
     Image.fromarray(scene.rgb).save(folder / "rgb.jpg")
     np.save(folder / "xyz.npy", frame.points)
     np.save(folder / "segmentation.npy", scene.segmap)
@@ -153,7 +153,7 @@ def test_an_unknown_folder_lists_what_is_known_and_what_is_there(tmp_path):
 
 def test_a_frame_file_is_read_with_and_without_masks(scene, tmp_path):
     for mask in (scene.segmap, None):
-        save_frame(make_frame(None, mask, depth=scene.depth, K=scene.K), tmp_path / "f.npz")
+        save_frame(make_frame(segmap=mask, depth=scene.depth, K=scene.K), tmp_path / "f.npz")
         assert read_frame(tmp_path / "f.npz").object_ids == ([] if mask is None else [-3, 7, 250])
 
 
@@ -247,7 +247,7 @@ def test_depth_may_be_npy_or_float_tiff(scene, images, tmp_path):
 def test_a_depth_scale_of_an_unknown_unit_is_asked_for(images):
     k = json.loads(images["intrinsics"].read_text())
     images["intrinsics"].write_text(json.dumps({**k, "depth_scale": 0.1}))
-    with pytest.raises(FrameError, match=r"--depth-scale 0\.1 (.|\n)*--depth-scale 0\.0001"):
+    with pytest.raises(FrameError, match=r"depth_scale=0\.1 (.|\n)*depth_scale=0\.0001"):
         read_images(**images)
     nearer = read_images(**images, depth_scale=0.0005)
     images["intrinsics"].write_text(json.dumps({**k, "depth_scale": 0.001}))

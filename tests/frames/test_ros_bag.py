@@ -6,10 +6,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 
+from brrp_cli.cli import main
 from brrp_cli.errors import FrameError
 from brrp_cli.frames.format import Request
-from brrp_cli.frames.readers import read_frame
+from brrp_cli.frames.readers import list_frames, read_frame
 
 rosbags = pytest.importorskip("rosbags")
 from rosbags.rosbag1 import Writer as Writer1  # noqa: E402
@@ -134,3 +136,12 @@ def test_a_damaged_bag_is_read_or_refused(scene, tmp_path, ros1):
     for index in ("abc", "²", "-1", 5000 * "9"):
         with pytest.raises(FrameError):
             read_frame(path, request=Request(index=index))
+
+
+def test_a_bag_says_what_it_holds(bag):
+    assert list_frames(bag) == ["0", "1"]
+    result = CliRunner().invoke(main, ["frame", str(bag), "--list"])
+    assert result.exit_code == 0, result.output
+    assert "2 frames" in result.output
+    assert "/camera/color/image_raw: 2 Image" in result.output
+    assert "/camera/color/camera_info: 1 CameraInfo" in result.output

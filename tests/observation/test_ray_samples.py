@@ -20,7 +20,11 @@ CONFIG = ObservationConfig()
 def frame(scene):
     """The scene as a frame."""
     return make_frame(
-        scene.rgb, scene.segmap, depth=scene.depth, K=scene.K, T_world_cam=scene.T_world_cam
+        rgb=scene.rgb,
+        segmap=scene.segmap,
+        depth=scene.depth,
+        K=scene.K,
+        T_world_cam=scene.T_world_cam,
     )
 
 
@@ -151,7 +155,7 @@ def test_objects_with_too_few_points_are_counted_apart(scene):
     depth = scene.depth.copy()
     depth[mask == 250] = np.nan
     mask[0, 0] = 9
-    observation = observe(make_frame(scene.rgb, mask, depth=depth, K=scene.K), CONFIG, 0)
+    observation = observe(make_frame(rgb=scene.rgb, segmap=mask, depth=depth, K=scene.K), CONFIG, 0)
     assert observation.too_few == {250: 0, 9: 1}
     assert list(observation.objects) == [-3, 7]
 
@@ -159,14 +163,14 @@ def test_objects_with_too_few_points_are_counted_apart(scene):
 def test_a_frame_of_unseen_objects_alone_is_observed_as_nothing(scene):
     mask = np.zeros_like(scene.segmap)
     mask[0, 0] = 5
-    observation = observe(make_frame(None, mask, depth=scene.depth, K=scene.K), CONFIG, 0)
+    observation = observe(make_frame(segmap=mask, depth=scene.depth, K=scene.K), CONFIG, 0)
     assert observation.plane is None
     assert (observation.objects, observation.too_few) == ({}, {5: 1})
 
 
 def test_without_background_there_is_no_plane_and_nothing_below(scene, caplog):
     depth = np.where(scene.segmap == 0, np.nan, scene.depth)
-    observation = observe(make_frame(None, scene.segmap, depth=depth, K=scene.K), CONFIG, 0)
+    observation = observe(make_frame(segmap=scene.segmap, depth=depth, K=scene.K), CONFIG, 0)
     assert observation.plane is None
     assert "No support plane" in caplog.text
     world = transform_points(scene.T_world_cam, observation.objects[7].samples)

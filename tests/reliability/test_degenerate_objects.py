@@ -45,7 +45,7 @@ def with_mask(seen: Frame, region, depth=None) -> Frame:
     mask[region] = 2
     if depth is not None:
         z[region] = depth
-    return make_frame(seen.rgb, mask, depth=z, K=K, T_world_cam=seen.T_world_cam)
+    return make_frame(rgb=seen.rgb, segmap=mask, depth=z, K=K, T_world_cam=seen.T_world_cam)
 
 
 ROWS, COLUMNS = np.mgrid[: SHAPE[0], : SHAPE[1]]
@@ -116,7 +116,7 @@ def test_a_mask_that_bleeds_onto_the_table(grow: int, seen: Frame, prior: Path) 
     from scipy.ndimage import binary_dilation
 
     mask = binary_dilation(seen.segmap == BOX, iterations=grow).astype(np.int64)
-    frame = make_frame(seen.rgb, mask, depth=seen.points[..., 2], K=K)
+    frame = make_frame(rgb=seen.rgb, segmap=mask, depth=seen.points[..., 2], K=K)
     sane(reconstruct(frame, open_prior(prior)))
 
 
@@ -150,7 +150,9 @@ def test_a_world_whose_origin_is_out_of_reach_of_single_precision_is_refused(
 
     T = np.eye(4)
     T[:3, 3] = [500_000.0, 4_000_000.0, 100.0]
-    frame = make_frame(seen.rgb, seen.segmap, depth=seen.points[..., 2], K=K, T_world_cam=T)
+    frame = make_frame(
+        rgb=seen.rgb, segmap=seen.segmap, depth=seen.points[..., 2], K=K, T_world_cam=T
+    )
     check_output(tmp_path / "out", frame, "camera", overwrite=False)
     with pytest.raises(OutputError, match="too far away"):
         check_output(tmp_path / "out", frame, "world", overwrite=False)

@@ -35,24 +35,26 @@ def overlap(first, second):
 @pytest.mark.parametrize("degrade", [lambda depth: depth, noisy], ids=["clean", "noisy"])
 def test_objects_on_the_table_are_found_from_left_to_right(scene, degrade):
     depth = degrade(np.where(np.isfinite(scene.depth), scene.depth, 0))
-    found = segment(make_frame(scene.rgb, None, depth=depth, K=scene.K))
+    found = segment(make_frame(rgb=scene.rgb, depth=depth, K=scene.K))
     assert np.unique(found).tolist() == [0, 1, 2, 3]
     for number, object_id in [(1, 7), (2, 250), (3, -3)]:
         assert overlap(found == number, scene.segmap == object_id) > 0.7, object_id
 
 
 def test_the_same_seed_gives_the_same_masks(scene):
-    frame = make_frame(scene.rgb, None, depth=scene.depth, K=scene.K)
+    frame = make_frame(rgb=scene.rgb, depth=scene.depth, K=scene.K)
     assert np.array_equal(segment(frame, 3), segment(frame, 3))
 
 
 def test_the_frames_own_masks_are_not_looked_at(scene):
-    frames = [make_frame(None, mask, depth=scene.depth, K=scene.K) for mask in (None, scene.segmap)]
+    frames = [
+        make_frame(segmap=mask, depth=scene.depth, K=scene.K) for mask in (None, scene.segmap)
+    ]
     assert np.array_equal(segment(frames[0]), segment(frames[1]))
 
 
 def test_what_stands_beside_the_table_is_background(scene):
-    found = segment(make_frame(None, None, depth=scene.depth, K=scene.K))
+    found = segment(make_frame(depth=scene.depth, K=scene.K))
     wall = scene.depth > 1.3
     assert wall.sum() > 100
     assert not found[wall & (scene.segmap == 0)].any()
@@ -63,10 +65,10 @@ def test_an_empty_table_and_no_table_are_told(scene):
     slope = (v - scene.K[1, 2]) / scene.K[1, 1]
     table = 0.5 / (0.7 * slope + 0.7)  # a plane that is tilted by 45 degrees
     with pytest.raises(FrameError, match="Nothing stands on the table"):
-        segment(make_frame(None, None, depth=table, K=scene.K))
+        segment(make_frame(depth=table, K=scene.K))
     clutter = np.random.default_rng(0).uniform(0.5, 5, scene.depth.shape)
     with pytest.raises(FrameError, match="Too little depth"):
-        segment(make_frame(None, None, depth=clutter, K=scene.K))
+        segment(make_frame(depth=clutter, K=scene.K))
 
 
 def test_a_bowls_floor_is_filled_and_the_crook_of_a_bend_is_not():
@@ -89,7 +91,7 @@ def boxes(*placed):
     }
     clean = photograph(things)
     depth = noisy(np.nan_to_num(clean.points[..., 2]))
-    return make_frame(clean.rgb, clean.segmap, depth=depth, K=clean.K)
+    return make_frame(rgb=clean.rgb, segmap=clean.segmap, depth=depth, K=clean.K)
 
 
 @pytest.mark.parametrize(
@@ -144,5 +146,5 @@ def test_a_mug_is_one_thing():
     mug = in_camera(outside.difference(inside).apply_translation([0, 0, 0.05]), T_CAM_WORLD)
     clean = photograph({1: mug})
     depth = noisy(np.nan_to_num(clean.points[..., 2]))
-    found = segment(make_frame(None, None, depth=depth, K=clean.K))
+    found = segment(make_frame(depth=depth, K=clean.K))
     assert overlap(found == 1, clean.segmap == 1) > 0.75

@@ -42,9 +42,13 @@ class Tab:
         self._session = found["sessionId"]
         for domain in ("Page", "Network", "Runtime", "Log"):
             self._call(f"{domain}.enable")
+        self.resize(WIDTH, HEIGHT)
+
+    def resize(self, width: int, height: int, *, phone: bool = False) -> None:
+        """The window's size, pixels; a phone shows a page as its viewport says."""
         self._call(
             "Emulation.setDeviceMetricsOverride",
-            width=WIDTH, height=HEIGHT, deviceScaleFactor=1, mobile=False,
+            width=width, height=height, deviceScaleFactor=1, mobile=phone,
         )  # fmt: skip
 
     def open(self, path: Path) -> None:

@@ -54,7 +54,9 @@ def photograph(things: list[trimesh.Trimesh]) -> Frame:
     sight = look([*things, in_camera(table, np.linalg.inv(T_WORLD_CAM))], K, SHAPE)
     ids = np.array([0, *range(1, len(things) + 1), 0])
     rgb = np.full((*SHAPE, 3), 128, np.uint8)
-    return make_frame(rgb, ids[sight.index + 1], depth=sight.depth, K=K, T_world_cam=T_WORLD_CAM)
+    return make_frame(
+        rgb=rgb, segmap=ids[sight.index + 1], depth=sight.depth, K=K, T_world_cam=T_WORLD_CAM
+    )
 
 
 def write_scenes(folder: Path, count: int = 1) -> list[Scene]:

@@ -65,7 +65,7 @@ def test_statistics_of_a_frame_name_every_column():
     depth = tilted_table()
     depth[60:160, 120:200] = 0.45
     depth[100:110, 20:30] = 0
-    frame = make_frame(None, (depth == 0.45).astype(int), depth=depth, K=K)
+    frame = make_frame(segmap=(depth == 0.45).astype(int), depth=depth, K=K)
     found = statistics(frame)
     assert tuple(found) == COLUMNS
     assert found["waves"] < 0.5

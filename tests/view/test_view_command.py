@@ -13,6 +13,7 @@ import trimesh
 from browser import browse, chromium
 from click.testing import CliRunner
 from made_result import BOX, ELL, SPECK, write_made_result
+from PIL import Image
 
 from brrp_cli.cli import main
 
@@ -107,6 +108,8 @@ def test_a_browser_draws_it_turns_objects_off_and_asks_for_nothing(page):
     with browse() as tab:
         tab.open(page)
         assert tab.run("document.body.dataset.ready") == "yes"
+        by_object = tab.screenshot()
+        tab.click("[value=uncertainty]")
         first = tab.screenshot()
         both = colourful(first)
         assert both.mean() > 0.05, "uncertainty is drawn in colour"
@@ -122,7 +125,7 @@ def test_a_browser_draws_it_turns_objects_off_and_asks_for_nothing(page):
         tab.click("[value=seen]")
         assert colourful(tab.screenshot()).mean() < 0.01, "the made image is grey"
         tab.click("[value=object]")
-        by_object = tab.screenshot()
+        np.testing.assert_array_equal(tab.screenshot()[60:640, 410:], by_object[60:640, 410:])
         assert colourful(by_object).mean() > 0.05
         assert (by_object != first).any()
 
@@ -161,6 +164,7 @@ def test_the_list_and_the_scale_tell_the_numbers_of_the_record(page, results):
         assert "too few points" in cards[SPECK] and "4 valid depth points" in cards[SPECK]
         box = next(item for item in record["objects"] if item["id"] == BOX)
         assert f"{box['extents'][0] * 100:.1f} ×" in cards[BOX]
+        tab.click("[value=uncertainty]")
         ticks = tab.run("document.querySelector('#ticks').innerText")
         assert ticks.startswith("0") and ticks.count("mm") == 4
 
@@ -175,6 +179,57 @@ def test_the_list_and_the_scale_tell_the_numbers_of_the_record(page, results):
         assert read != said and re.match(
             r"object -?\d+: spread .* mm; \(.*\) m, camera frame", read
         )
+
+
+def overlap(tab, one: str, other: str) -> bool:
+    """Whether two elements that are shown cover a common pixel."""
+    return tab.run(
+        f"(() => {{ const [a, b] = ['{one}', '{other}'].map(s =>"
+        " document.querySelector(s).getBoundingClientRect());"
+        " return a.width * b.width > 0 && a.left < b.right && b.left < a.right"
+        " && a.top < b.bottom && b.top < a.bottom; })()"
+    )
+
+
+def share_of(picture: np.ndarray, colour: list[int]) -> float:
+    """Share of the pixels whose colour is `colour` in some light."""
+    lit = picture.astype(float)
+    length = np.linalg.norm(lit, axis=2) * np.linalg.norm(colour)
+    cosine = (lit @ np.array(colour, float)) / np.maximum(length, 1)
+    return float(((cosine > 0.995) & (np.ptp(lit, axis=2) > 40)).mean())
+
+
+@needs_browser
+@pytest.mark.parametrize(("width", "height"), [(1280, 800), (390, 844)], ids=["desk", "phone"])
+def test_a_photograph_at_two_widths_tells_objects_apart_and_hides_nothing(
+    width, height, page, tmp_path
+):
+    told = json.loads(embedded(page, "told"))
+    colours = {item["id"]: item["colour"] for item in told["objects"]}
+    with browse() as tab:
+        tab.resize(width, height, phone=width < 500)
+        tab.open(page)
+        for colour in ("object", "uncertainty"):
+            if colour == "uncertainty":
+                tab.click(f"[value={colour}]")
+                tab.run("window.scrollTo(0, 0)")
+            photograph = tab.screenshot()
+            Image.fromarray(photograph).save(tmp_path / f"{colour}.png")
+            assert photograph.shape == (height, width, 3)
+            assert tab.run("document.documentElement.scrollWidth") <= width
+            for parts in (("#scale", "#probe"), ("nav", "#probe"), ("nav", "#scale")):
+                assert not overlap(tab, *parts), parts
+            left, top, right, bottom = tab.run(
+                "(() => { const r = document.querySelector('#canvas').getBoundingClientRect();"
+                " return [r.left, r.top, r.right, r.bottom]; })()"
+            )
+            drawing = photograph[int(top) + 50 : int(bottom) - 60, int(left) : int(right)]
+            if colour == "object":
+                assert all(share_of(drawing, colours[i]) > 0.01 for i in (BOX, ELL))
+        # The longest readout there is stays clear of the scale, too.
+        tab.run("document.querySelector('#probe').textContent = 'object 123: spread 12.3 mm; '"
+                " + '(-10.123, -10.123, -10.123) m, camera frame'")  # fmt: skip
+        assert not overlap(tab, "#scale", "#probe")
 
 
 def test_rerun_writes_a_recording_of_everything(results, tmp_path):

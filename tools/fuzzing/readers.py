@@ -68,7 +68,9 @@ def arrays(data: bytes) -> None:
             given[name] = np.frombuffer(raw, kind).reshape(shape)
     scale = draw.ConsumeFloat() if draw.ConsumeBool() else None
     finite(
-        make_frame(given.pop("rgb", None), given.pop("segmap", None), **given, depth_scale=scale)
+        make_frame(
+            rgb=given.pop("rgb", None), segmap=given.pop("segmap", None), **given, depth_scale=scale
+        )
     )
 
 

@@ -38,4 +38,6 @@ def with_pixels(frame: Frame, factor: float) -> Frame:
     # Pixel centres are whole numbers.
     K[:2, 2] += (factor - 1) / 2
     at = np.ix_(rows, columns)
-    return make_frame(frame.rgb[at], frame.segmap[at], depth=frame.points[..., 2][at], K=K)
+    return make_frame(
+        rgb=frame.rgb[at], segmap=frame.segmap[at], depth=frame.points[..., 2][at], K=K
+    )

@@ -97,8 +97,8 @@ def read_image(folder: Path, image: int) -> Frame:
     if "cam_R_w2c" in camera and "cam_t_w2c" in camera:
         T_world_cam = np.linalg.inv(rigid(camera, "cam_R_w2c", "cam_t_w2c", where))
     return make_frame(
-        read_colour(_image_file(folder, _COLOURS, image)),
-        _masks(folder, image),
+        rgb=read_colour(_image_file(folder, _COLOURS, image)),
+        segmap=_masks(folder, image),
         depth=read_depth(_image_file(folder, ("depth",), image)),
         K=K,
         T_world_cam=T_world_cam,
@@ -187,9 +187,19 @@ def read(path: Path, request: Request) -> Frame:
     return read_image(scene, pick(images, number, names, scene))
 
 
+def names(path: Path, request: Request) -> list[str]:
+    """SCENE/IMAGE of every image, or IMAGE in a scene's folder. Errors: FrameError."""
+    found = []
+    for scene in scene_folders(path):
+        above = "" if scene == path else f"{scene.name}/"
+        found += [f"{above}{image}" for image in sorted(read_table(scene / CAMERA))]
+    return found
+
+
 FORMAT = Format(
     title="a BOP data set",
     layout="scene_camera.json, rgb/ or gray/, depth/, here or one or two folders below",
     matches=lambda path: path.is_dir() and bool(scene_folders(path)),
     read=read,
+    names=names,
 )

@@ -23,8 +23,8 @@ def read(folder: Path, request: Request) -> Frame:
     )
     rgb, xyz, segmentation = (folder / name for name in FILES)
     return make_frame(
-        read_colour(rgb),
-        read_npy(segmentation),
+        rgb=read_colour(rgb),
+        segmap=read_npy(segmentation),
         xyz=read_npy(xyz),
         depth_scale=request.depth_scale,
         source=folder,

@@ -1,7 +1,8 @@
 """A folder of frames that no known recorder wrote: color.png and depth.png, NAME-color.png and
 NAME-depth.png (also with _ or . and with rgb), or the same names below rgb/ or color/ and depth/.
 
-Intrinsics are the one JSON file whose name speaks of a camera, here or in the folder above.
+Intrinsics are the one JSON file whose name speaks of a camera, or GraspNet's meta.mat, here or in
+the folder above.
 """
 
 from __future__ import annotations
@@ -12,7 +13,14 @@ from pathlib import Path
 from brrp_cli.errors import FrameError
 from brrp_cli.frames.format import Format, Request
 from brrp_cli.frames.frame import Frame
-from brrp_cli.frames.recordings import COLOUR_ENDINGS, DEPTH_ENDINGS, by_name, images_in, read_pair
+from brrp_cli.frames.recordings import (
+    COLOUR_ENDINGS,
+    DEPTH_ENDINGS,
+    by_name,
+    images_in,
+    pairs_below,
+    read_pair,
+)
 
 _COLOUR = re.compile(r"^(.*?)[-_.]?(?:color|colour|rgb)$", re.IGNORECASE)
 _DEPTH = re.compile(r"^(.*?)[-_.]?depth$", re.IGNORECASE)
@@ -23,9 +31,7 @@ _COLOUR_FOLDERS = ("color", "colour", "rgb", "image", "images")
 def pairs_in(folder: Path) -> dict[str, tuple[Path, Path]]:
     """Name -> (colour, depth) of the frames in a folder, by name; `0` where they have none."""
     for name in _COLOUR_FOLDERS:
-        pairs = by_name(
-            images_in(folder / name, COLOUR_ENDINGS), images_in(folder / "depth", DEPTH_ENDINGS)
-        )
+        pairs = pairs_below(folder, name)
         if pairs:
             return pairs
     colours = _named(images_in(folder, COLOUR_ENDINGS), _COLOUR)
@@ -41,6 +47,7 @@ def find_intrinsics(folder: Path) -> Path:
     """The JSON file of the camera, in the folder or in the one above. Errors: FrameError."""
     for place in (folder, folder.resolve().parent):
         found = sorted(path for path in place.glob("*.json") if _CAMERA.search(path.stem))
+        found += [path for path in [place / "meta.mat"] if path.is_file()]
         if len(found) == 1:
             return found[0]
         if found:
@@ -53,7 +60,8 @@ def find_intrinsics(folder: Path) -> Path:
     raise FrameError(
         "No intrinsics were found",
         where=folder,
-        expected="a JSON file whose name speaks of a camera or intrinsics, here or one folder up",
+        expected="a JSON file whose name speaks of a camera or intrinsics, or meta.mat, here or one"
+        " folder up",
         fix="pass --intrinsics K.json",
     )
 
@@ -70,5 +78,6 @@ FORMAT = Format(
     layout="color.png, depth.png; NAME-color.png, NAME-depth.png; or color/NAME, depth/NAME",
     matches=lambda path: path.is_dir() and bool(pairs_in(path)),
     read=read,
+    names=lambda path, request: list(pairs_in(path)),
     last=True,
 )

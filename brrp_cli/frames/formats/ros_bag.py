@@ -9,6 +9,7 @@ import logging
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +23,7 @@ log = logging.getLogger(__name__)
 _IMAGES = ("sensor_msgs/msg/Image", "sensor_msgs/msg/CompressedImage")
 _INFO = "sensor_msgs/msg/CameraInfo"
 _APART = 0.05  # seconds between a colour image and the depth that belongs to it
+_RECORDED_APART = 2 * 10**9  # nanoseconds between the two in the bag
 
 
 @dataclass(frozen=True)
@@ -47,17 +49,21 @@ def read(path: Path, request: Request) -> Frame:
         choice = _choose(reader, request, path)
         log.info("Topics: %s, %s, %s", choice.color, choice.depth, choice.info)
         info = next((message for _, message in _messages(reader, choice.info)), None)
-        color = next(
-            (pair for i, pair in enumerate(_messages(reader, choice.color)) if i == index),
-            None,
-        )
-        if info is None or color is None:
-            raise FrameError("The bag has no such frame", where=path, found=f"--index {index}")
-        depth = min(
-            _messages(reader, choice.depth),
-            key=lambda pair: abs(_stamp(pair) - _stamp(color)),
-            default=None,
-        )
+        times = _times(reader, choice.color)
+        if info is None or index >= len(times):
+            raise FrameError(
+                "The bag has no such frame",
+                where=path,
+                expected=f"0 to {len(times) - 1}",
+                found=f"--index {index}",
+            )
+        time = times[index]
+        # Of messages with one time of recording the one that is as far from the first of them.
+        same = times[:index].count(time)
+        color = next(islice(_messages(reader, choice.color, time, time + 1), same, None))
+        # A recorder writes what was taken at one moment within this time.
+        near = _messages(reader, choice.depth, time - _RECORDED_APART, time + _RECORDED_APART)
+        depth = min(near, key=lambda pair: abs(_stamp(pair) - _stamp(color)), default=None)
         if depth is None or abs(_stamp(depth) - _stamp(color)) > _APART:
             raise FrameError(
                 "No depth image is near the colour image in time",
@@ -71,6 +77,22 @@ def read(path: Path, request: Request) -> Frame:
             error.where = path
             raise
     return Frame(frame.rgb, frame.points, frame.segmap, frame.K, source=path)
+
+
+def names(path: Path, request: Request) -> list[str]:
+    """The numbers of the colour images. Errors: as of `read`."""
+    with _damage_told(path), _opened(path) as reader:
+        color = _choose(reader, request, path).color
+        return [str(number) for number in range(len(_times(reader, color)))]
+
+
+def contents(path: Path, request: Request) -> list[str]:
+    """The topics, with the type and the number of their messages. Errors: as of `read`."""
+    with _damage_told(path), _opened(path) as reader:
+        return [
+            f"{topic}: {about.msgcount} {(about.msgtype or 'of several types').rpartition('/')[2]}"
+            for topic, about in sorted(reader.topics.items())
+        ]
 
 
 @contextmanager
@@ -111,10 +133,21 @@ def _opened(path: Path) -> Iterator[Any]:
         reader.close()
 
 
-def _messages(reader: Any, topic: str) -> Any:
-    connections = [one for one in reader.connections if one.topic == topic]
-    for connection, time, raw in reader.messages(connections=connections):
+def _messages(
+    reader: Any, topic: str, start: int | None = None, stop: int | None = None
+) -> Iterator[tuple[int, Any]]:
+    """(time of recording, message) of a topic, from `start` until before `stop`, nanoseconds."""
+    for connection, time, raw in reader.messages(_connections(reader, topic), start, stop):
         yield time, reader.deserialize(raw, connection.msgtype)
+
+
+def _connections(reader: Any, topic: str) -> list[Any]:
+    return [one for one in reader.connections if one.topic == topic]
+
+
+def _times(reader: Any, topic: str) -> list[int]:
+    """When the messages of a topic were recorded, nanoseconds; they stay packed."""
+    return [time for _, time, _ in reader.messages(_connections(reader, topic))]
 
 
 def _stamp(pair: tuple[int, Any]) -> float:
@@ -171,4 +204,6 @@ FORMAT = Format(
         or (path / "metadata.yaml").is_file()
     ),
     read=read,
+    names=names,
+    contents=contents,
 )

@@ -39,6 +39,25 @@ def read(folder: Path, request: Request) -> Frame:
 
     Errors: FrameError, also where no depth is near it in time or nobody tells the intrinsics.
     """
+    pairs = _pairs(folder)
+    time, colour, depth = pick(pairs, request.index, [time for time, _, _ in pairs], folder)
+    return make_frame(
+        rgb=read_colour(folder / colour),
+        depth=read_depth(folder / depth),
+        K=_intrinsics(folder, request),
+        T_world_cam=_pose(folder / "groundtruth.txt", float(time)),
+        depth_scale=request.depth_scale or METRES_PER_UNIT,
+        source=folder / colour,
+    )
+
+
+def names(folder: Path, request: Request) -> list[str]:
+    """The times of the colour images that have depth. Errors: FrameError."""
+    return [time for time, _, _ in _pairs(folder)]
+
+
+def _pairs(folder: Path) -> list[tuple[str, str, str]]:
+    """(time, colour image, depth image) of every pair. Errors: FrameError, also for none."""
     colours, depths = (_listed(folder / name) for name in ("rgb.txt", "depth.txt"))
     times = np.array([float(time) for time, _ in depths])
     pairs = []
@@ -52,16 +71,7 @@ def read(folder: Path, request: Request) -> Frame:
             where=folder,
             expected=f"within {_APART} s, as rgb.txt and depth.txt tell",
         )
-    time, colour, depth = pick(pairs, request.index, [time for time, _, _ in pairs], folder)
-    return make_frame(
-        read_colour(folder / colour),
-        None,
-        depth=read_depth(folder / depth),
-        K=_intrinsics(folder, request),
-        T_world_cam=_pose(folder / "groundtruth.txt", float(time)),
-        depth_scale=request.depth_scale or METRES_PER_UNIT,
-        source=folder / colour,
-    )
+    return pairs
 
 
 def _listed(path: Path) -> list[tuple[str, str]]:
@@ -127,4 +137,5 @@ FORMAT = Format(
     layout="rgb.txt, depth.txt",
     matches=lambda path: (path / "rgb.txt").is_file() and (path / "depth.txt").is_file(),
     read=read,
+    names=names,
 )

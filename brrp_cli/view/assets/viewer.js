@@ -66,7 +66,7 @@
     const titles = {
       "retrieved": "",
       "P": "P(c|R): how probable retrieval holds it, before anything was placed",
-      "alignment_score": "what the frame says for its best placement, 1 at best",
+      "score": "alignment score: what the frame says for its best placement, 1 at best",
       "weight": "of it in the posterior",
       "size": "factor of its stored size, at its best placement",
     };

@@ -1,0 +1,243 @@
+"""--frames: many frames of one source in one process, each into a folder of its own."""
+
+from __future__ import annotations
+
+import io
+import json
+import re
+import time
+from collections.abc import Callable
+from contextlib import ExitStack, redirect_stdout
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from brrp_cli.errors import BrrpError, FrameError, OutputError, ResultError, unexpected
+from brrp_cli.progress import hushed, note, only_bar, say
+
+if TYPE_CHECKING:
+    from brrp_cli.commands.object_table import Told
+    from brrp_cli.commands.source_options import SourceOptions
+    from brrp_cli.config.segmentation import SegmentConfig
+    from brrp_cli.frames.frame import Frame
+
+SUMMARY = "frames.json"
+DONE, FAILED, SKIPPED = "done", "failed", "was there"
+
+
+def frame_slice(ctx: click.Context, option: click.Parameter, value: str | None) -> slice | None:
+    """A:B or A:B:STEP, as Python counts; any part may be left out."""
+    if value is None:
+        return None
+    parts = value.split(":")
+    try:
+        if len(parts) not in (2, 3):
+            raise ValueError
+        numbers = [int(part) if part else None for part in parts]
+        if len(numbers) == 3 and numbers[2] is not None and numbers[2] < 1:
+            raise ValueError
+    except ValueError:
+        raise click.BadParameter(
+            f"{value!r} is no range: 0:10, 5:, : (all) or 0:300:30 (every 30th);"
+            " one frame is --index N",
+            ctx,
+            option,
+        ) from None
+    return slice(*numbers)
+
+
+@dataclass(frozen=True)
+class Work:
+    """What is done to each frame.
+
+    with_masks : (frame, its folder) -> the frame with masks, and how they were made
+    one : (frame, how, its folder) -> what is told of its objects, once all is written
+    settings : what decides the result, as result.json holds it
+    """
+
+    source: SourceOptions
+    with_masks: Callable[[Frame, Path], tuple[Frame, SegmentConfig | None]]
+    one: Callable[[Frame, SegmentConfig | None, Path], list[Told]]
+    settings: dict[str, Any]
+    overwrite: bool
+
+
+def check_many(source: SourceOptions, output: Path, *, open_it: bool) -> None:
+    """UsageError for options that go with one frame; OutputError for a folder of other things."""
+    if source.path is None:
+        raise click.UsageError("--frames chooses from a SOURCE, not from images")
+    if source.index is not None:
+        raise click.UsageError("--frames and --index exclude each other")
+    if source.masks is not None:
+        raise click.UsageError("--masks is of one frame, --frames of many")
+    if open_it:
+        raise click.UsageError("--view opens one page: write them with --html instead")
+    if output.is_file() or (
+        output.is_dir() and any(output.iterdir()) and not (output / SUMMARY).is_file()
+    ):
+        raise OutputError(
+            "The output folder holds other things",
+            where=output,
+            expected=f"a folder that --frames wrote, with {SUMMARY} in it, an empty one or none",
+            fix="choose another folder with -o",
+        )
+
+
+def folder_name(name: str) -> str:
+    """The name of a frame as one of a folder."""
+    return re.sub(r"[^\w.+-]+", "_", name).strip("._") or "frame"
+
+
+def run_many(work: Work, frames: slice, output: Path, report: dict[str, Any]) -> bool:
+    """All chosen frames, one after the other; what goes wrong with one is told and ends nothing.
+
+    Frames that were written before with the same settings are left as they are, unless all are to
+    be overwritten. Returns whether any frame, or any object of one, failed. Errors: BrrpError for
+    what concerns every frame; UsageError where none is chosen.
+    """
+    every = work.source.names()
+    chosen = every[frames]
+    if not chosen:
+        raise click.UsageError(f"--frames chooses none of the {len(every)} frames of the source")
+    folders = _folders(chosen, output)
+    todo = {name for name in chosen if work.overwrite or not _is_done(folders[name], work.settings)}
+    if len(todo) < len(chosen):
+        note(f"{len(chosen) - len(todo)} of {len(chosen)} frames were there and are left")
+    told: list[dict[str, Any]] = [
+        {"frame": name, "folder": folders[name].name, "status": SKIPPED} for name in chosen
+    ]
+    report["frames"] = told
+    write_summary(work, output, told)
+    failed = False
+    with ExitStack() as stack:
+        step = stack.enter_context(only_bar(len(todo), "frames"))
+        first = True
+        for about in told:
+            if about["frame"] not in todo:
+                continue
+            failed |= _frame(work, about, folders[about["frame"]])
+            step()
+            if first:  # what holds for every frame has been noted once
+                stack.enter_context(hushed())
+                first = False
+    write_summary(work, output, told)
+    _join_poses(output, list(folders.values()))
+    count = {status: sum(a["status"] == status for a in told) for status in (DONE, FAILED, SKIPPED)}
+    say(
+        f"Wrote {count[DONE]} of {len(chosen)} frames"
+        + (f", {count[SKIPPED]} were there" if count[SKIPPED] else "")
+        + (f", {count[FAILED]} failed" if count[FAILED] else "")
+        + f": {output}/ (FRAME/ as of one frame, {SUMMARY})"
+    )
+    return failed
+
+
+def _frame(work: Work, about: dict[str, Any], folder: Path) -> bool:
+    """One frame; whether it, or one of its objects, failed."""
+    name, start = about["frame"], time.perf_counter()
+    try:
+        seen = replace(work.source, index=name if _many(work.source) else None).read()
+        with redirect_stdout(io.StringIO()):
+            table = work.one(*work.with_masks(seen, folder), folder)
+    except (click.ClickException, OSError):
+        raise
+    except BrrpError as error:
+        if not isinstance(error, FrameError):
+            raise
+        return _failure(about, error)
+    except Exception as error:  # a library stumbled over this frame; the others may be well
+        return _failure(about, unexpected(error))
+    about["status"] = DONE
+    about["seconds"] = round(time.perf_counter() - start, 2)
+    about["objects"] = [each.record() for each in table]
+    say(_line(name, table, about["seconds"]))
+    return any(each.failed for each in table)
+
+
+def _many(source: SourceOptions) -> bool:
+    """Whether the format takes --index at all."""
+    from brrp_cli.frames.readers import format_of
+
+    assert source.path is not None
+    return format_of(source.path).names is not None
+
+
+def _failure(about: dict[str, Any], error: BrrpError) -> bool:
+    about["status"], about["message"] = FAILED, str(error)
+    say(f"  {about['frame']}: failed, {error.what}")
+    click.echo(f"Error: frame {about['frame']}: {error}", err=True)
+    return True
+
+
+def _line(name: str, table: list[Told], seconds: float) -> str:
+    made = sum(not each.failed for each in table)
+    taken = [each.taken_for or each.how for each in table if each.taken_for or each.how]
+    warned = sum(bool(each.warnings) for each in table)
+    line = f"  {name}: {made} of {len(table)} objects, {seconds:.1f} s"
+    line += f": {', '.join(taken)}" if taken else ""
+    return line + (f" ({warned} with warnings)" if warned else "")
+
+
+def _folders(names: list[str], output: Path) -> dict[str, Path]:
+    """Frame -> folder. Errors: OutputError where two would have one."""
+    folders = {name: output / folder_name(name) for name in names}
+    if len(set(folders.values())) < len(folders):
+        raise OutputError(
+            "Two frames would have one folder",
+            where=output,
+            found=", ".join(names[:8]),
+            fix="choose fewer with --frames",
+        )
+    return folders
+
+
+def _is_done(folder: Path, settings: dict[str, Any]) -> bool:
+    """Whether the results of a frame are there. Errors: OutputError where other settings made
+    them."""
+    if not folder.exists():
+        return False
+    from brrp_cli.api import open_result
+
+    try:
+        record = open_result(folder).record
+    except ResultError:
+        return False
+    prior = record.get("prior")
+    found = {key: record.get(key) for key in settings}
+    found["prior"] = prior.get("digest") if isinstance(prior, dict) else None
+    wanted = json.loads(json.dumps(settings))
+    different = [key for key in settings if found[key] != wanted[key]]
+    if different:
+        raise OutputError(
+            "A frame was reconstructed with other settings before",
+            where=folder,
+            expected=_shown(wanted, different),
+            found=_shown(found, different),
+            fix="choose another folder with -o, or pass --overwrite to do all frames again",
+        )
+    return True
+
+
+def _shown(settings: dict[str, Any], keys: list[str]) -> str:
+    return ", ".join(key if key == "config" else f"{key} {settings[key]}" for key in keys)
+
+
+def write_summary(work: Work, output: Path, told: list[dict[str, Any]]) -> None:
+    """frames.json: what became of every frame. Errors: OutputError."""
+    from brrp_cli.files import write_bytes
+
+    table = {"source": str(work.source.path), "settings": work.settings, "frames": told}
+    write_bytes(output / SUMMARY, (json.dumps(table, indent=1) + "\n").encode())
+
+
+def _join_poses(output: Path, folders: list[Path]) -> None:
+    """One BOP results file of all frames that have one."""
+    from brrp_cli.commands.reconstruct import POSES
+    from brrp_cli.files import write_bytes
+
+    texts = [(f / POSES).read_text().splitlines() for f in folders if (f / POSES).is_file()]
+    if texts:
+        rows = [texts[0][0], *(row for text in texts for row in text[1:])]
+        write_bytes(output / POSES, ("\n".join(rows) + "\n").encode())

@@ -1,0 +1,30 @@
+"""When an object of a stream is the one of the last frame, and when it has not moved."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from brrp_cli.config.ranges import share
+
+
+@dataclass(frozen=True)
+class TrackConfig:
+    """Lengths are metres, in the camera frame of the newer image.
+
+    overlap : of an object's points, moved as the camera was, the share that must fall on a mask
+        for the two to be one object
+    reach : that an object's middle may have moved between two frames to be still looked for;
+        colour : mean difference of its colours, of 255, at most; growth : factor by which its
+        number of pixels may differ
+    still : median distance along the ray between what was seen and what is seen of an object, or
+        of the background, that has not moved; still_mask : IoU of its two masks, at least
+    still_camera : metres and radians by which poses of one camera that stands may differ
+    """
+
+    overlap: float = share(0.3)
+    reach: float = 0.3
+    colour: float = 40.0
+    growth: float = 2.0
+    still: float = 0.002
+    still_mask: float = share(0.9)
+    still_camera: float = 0.0005

@@ -1,0 +1,28 @@
+"""How a message names an option: as the user typed it, or would have typed it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
+
+_TYPED: ContextVar[bool] = ContextVar("typed", default=False)
+
+
+@contextmanager
+def command_line() -> Iterator[None]:
+    """Within it options are named as on the command line; else as Python's arguments."""
+    token = _TYPED.set(True)
+    try:
+        yield
+    finally:
+        _TYPED.reset(token)
+
+
+def option(name: str, value: object = None) -> str:
+    """`--depth-scale 0.001` on the command line, `depth_scale=0.001` in Python; without a value
+    `--depth-scale` and `depth_scale`."""
+    if _TYPED.get():
+        typed = "--" + name.replace("_", "-")
+        return typed if value is None else f"{typed} {value}"
+    return name if value is None else f"{name}={value}"

@@ -1,0 +1,145 @@
+"""Which objects of a frame are those of the frame before, and which of these have not moved.
+
+Where the camera's motion is known (both frames have T_world_cam, or the background has not moved)
+an object is where its points fall, moved as the camera was. Objects that were moved are looked for
+near by, by their colour and size. Ids are never used again.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brrp_cli.config.tracking import TrackConfig
+from brrp_cli.frames.frame import BACKGROUND, Frame
+from brrp_cli.frames.projection import at_pixels
+from brrp_cli.geometry import transform_points
+
+
+@dataclass(frozen=True)
+class Followed:
+    """A frame whose ids are those of the tracks; next_id : the first id that is free."""
+
+    frame: Frame
+    next_id: int
+
+
+def first_frame(frame: Frame) -> Followed:
+    """The tracks of a stream's first frame: its own ids."""
+    return Followed(frame, max([0, *frame.object_ids]) + 1)
+
+
+def follow(last: Followed, frame: Frame, config: TrackConfig) -> Followed:
+    """The frame with the ids of the last one where an object is the same, and new ones else."""
+    T_now_last = camera_motion(last.frame, frame, config)
+    matches = match(last.frame, frame, T_now_last, config)
+    segmap, next_id = np.zeros_like(frame.segmap), last.next_id
+    for object_id in frame.object_ids:
+        track = matches.get(object_id)
+        if track is None:
+            track, next_id = next_id, next_id + 1
+        segmap[frame.segmap == object_id] = track
+    return Followed(replace(frame, segmap=segmap), next_id)
+
+
+def unmoved(before: Frame, frame: Frame, config: TrackConfig) -> frozenset[int]:
+    """The ids of two frames of one stream whose object has not moved between them; none where the
+    camera has, or may have."""
+    T_now_last = camera_motion(before, frame, config)
+    if T_now_last is None or not _stands(T_now_last, config):
+        return frozenset()
+    common = set(before.object_ids) & set(frame.object_ids)
+    return frozenset(i for i in common if _unmoved(before, frame, i, config))
+
+
+def camera_motion(last: Frame, frame: Frame, config: TrackConfig) -> NDArray[np.float64] | None:
+    """T_now_last (4, 4) between the two camera frames; the identity where nobody tells and the
+    background has not moved; None where it has."""
+    if last.T_world_cam is not None and frame.T_world_cam is not None:
+        return np.asarray(np.linalg.inv(frame.T_world_cam) @ last.T_world_cam)
+    if last.shape != frame.shape or not np.allclose(last.K, frame.K):
+        return None
+    ground = (last.segmap == BACKGROUND) & (frame.segmap == BACKGROUND)
+    both = ground & last.valid & frame.valid
+    if both.sum() < 0.2 * both.size:
+        return None
+    apart = np.abs(last.points[both][:, 2] - frame.points[both][:, 2])
+    # A camera that turns changes depth at every edge, one that slides along a table at few places.
+    colour = np.abs(last.rgb[ground].astype(np.int16) - frame.rgb[ground]).mean()
+    same = np.median(apart) <= config.still and np.quantile(apart, 0.9) <= 5 * config.still
+    return np.eye(4) if same and colour <= config.colour / 4 else None
+
+
+def _stands(T: NDArray[np.float64], config: TrackConfig) -> bool:
+    turned = np.linalg.norm(T[:3, :3] - np.eye(3))
+    return bool(max(turned, np.linalg.norm(T[:3, 3])) <= config.still_camera)
+
+
+def match(
+    last: Frame, frame: Frame, T_now_last: NDArray[np.float64] | None, config: TrackConfig
+) -> dict[int, int]:
+    """Id in the frame -> id in the last one: first by place, then, of what is left, by nearness,
+    colour and size."""
+    T = np.eye(4) if T_now_last is None else T_now_last
+    found = _assign(last, frame, lambda a, b: _overlap(last, frame, T, a, b, config), {})
+    return found | _assign(last, frame, lambda a, b: _alike(last, frame, T, a, b, config), found)
+
+
+def _assign(
+    last: Frame, frame: Frame, score: Callable[[int, int], float], taken: dict[int, int]
+) -> dict[int, int]:
+    """Pairs (id, id of the last frame) of the largest sum of scores, of those above 0."""
+    from scipy.optimize import linear_sum_assignment
+
+    old = [i for i in last.object_ids if i not in taken.values()]
+    new = [i for i in frame.object_ids if i not in taken]
+    if not old or not new:
+        return {}
+    scores = np.array([[score(a, b) for b in new] for a in old])
+    rows, columns = linear_sum_assignment(-scores)
+    return {new[c]: old[r] for r, c in zip(rows, columns, strict=True) if scores[r, c] > 0}
+
+
+def _overlap(
+    last: Frame, frame: Frame, T: NDArray[np.float64], old: int, new: int, config: TrackConfig
+) -> float:
+    """Share of the old object's points that fall on the new mask; 0 where it is too little."""
+    points = transform_points(T, last.object_points(old))
+    if not len(points):
+        return 0.0
+    ids = at_pixels(points, frame.segmap, frame)
+    hits = float((ids == new).sum()) / len(points)
+    return hits if hits >= config.overlap else 0.0
+
+
+def _alike(
+    last: Frame, frame: Frame, T: NDArray[np.float64], old: int, new: int, config: TrackConfig
+) -> float:
+    """1 where the new object stands on the old one's place and looks as it did, down to 0."""
+    before, now = last.segmap == old, frame.segmap == new
+    points, seen = transform_points(T, last.object_points(old)), frame.object_points(new)
+    if not len(points) or not len(seen):
+        return 0.0
+    way = float(np.linalg.norm(np.median(points, axis=0) - np.median(seen, axis=0)))
+    colour = np.abs(last.rgb[before].mean(axis=0) - frame.rgb[now].mean(axis=0)).mean()
+    growth = max(before.sum(), now.sum()) / min(before.sum(), now.sum())
+    if way > config.reach or colour > config.colour or growth > config.growth:
+        return 0.0
+    return float((1 - way / config.reach) * (1 - colour / config.colour)) + 1e-9
+
+
+def _unmoved(last: Frame, frame: Frame, object_id: int, config: TrackConfig) -> bool:
+    """Whether an object is where it was, in images of one camera that stands."""
+    if last.shape != frame.shape:
+        return False
+    before, now = last.segmap == object_id, frame.segmap == object_id
+    if (before & now).sum() < config.still_mask * (before | now).sum():
+        return False
+    both = before & now & last.valid & frame.valid
+    if not both.any():
+        return False
+    apart = np.abs(last.points[both][:, 2] - frame.points[both][:, 2])
+    return bool(np.median(apart) <= config.still)

@@ -1,0 +1,144 @@
+"""Many frames of one source: one process, a folder each, what was done is left, what fails told."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner, Result
+from sphere_method import METHOD
+from table_scene import T_CAM_WORLD, in_camera, photograph
+
+from brrp_cli.cli import main
+from brrp_cli.frames.npz import load_frame, save_frame
+from brrp_cli.methods.registry import METHODS
+from brrp_cli.shapes import solids
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory) -> Path:
+    """Four frames of a box that moves; the third is cut."""
+    folder = tmp_path_factory.mktemp("many") / "frames"
+    folder.mkdir()
+    for i in range(4):
+        box = solids.moved(solids.box(0.07, 0.07, 0.1), y=0.03 * i)
+        save_frame(photograph({1: in_camera(box, T_CAM_WORLD)}), folder / f"f{i}.npz")
+    whole = (folder / "f2.npz").read_bytes()
+    (folder / "f2.npz").write_bytes(whole[:500])
+    return folder
+
+
+@pytest.fixture
+def source(made, tmp_path, monkeypatch) -> Path:
+    monkeypatch.setitem(METHODS, METHOD.name, METHOD)
+    return Path(shutil.copytree(made, tmp_path / "frames"))
+
+
+def run(source: Path, *arguments: object) -> Result:
+    result = CliRunner().invoke(
+        main, ["reconstruct", str(source), "--method", "sphere", *map(str, arguments)]
+    )
+    if result.exception is not None and not isinstance(result.exception, SystemExit):
+        raise result.exception
+    return result
+
+
+def test_every_frame_has_a_folder_and_what_fails_ends_nothing(source, tmp_path):
+    out = tmp_path / "out"
+    result = run(source, "--frames", ":", "-o", out)
+    assert result.exit_code == 3, result.output
+    assert sorted(p.name for p in out.iterdir()) == [
+        "f0.npz", "f1.npz", "f3.npz", "frames.json",
+    ]  # fmt: skip
+    for i in (0, 1, 3):
+        seen = load_frame(out / f"f{i}.npz" / "frame.npz")
+        assert np.array_equal(seen.segmap, load_frame(source / f"f{i}.npz").segmap)
+        assert (out / f"f{i}.npz" / "object_1.ply").is_file()
+    assert "Wrote 3 of 4 frames, 1 failed" in result.stdout
+    assert result.stderr.count("Error: frame f2.npz: ") == 1
+    told = json.loads((out / "frames.json").read_text())["frames"]
+    assert [each["status"] for each in told] == ["done", "done", "failed", "done"]
+
+    # The failed one alone is done again, and what was written stays as it is.
+    box = in_camera(solids.moved(solids.box(0.07, 0.07, 0.1), y=0.06), T_CAM_WORLD)
+    save_frame(photograph({1: box}), source / "f2.npz")
+    before = {p: p.stat().st_mtime_ns for p in out.rglob("*.ply")}
+    again = run(source, "--frames", ":", "-o", out)
+    assert again.exit_code == 0, again.output
+    assert "Wrote 1 of 4 frames, 3 were there" in again.stdout
+    assert (out / "f2.npz" / "object_1.ply").is_file()
+    assert {p: p.stat().st_mtime_ns for p in before} == before
+
+    # With other settings nothing is taken for done.
+    other = run(source, "--frames", ":", "-o", out, "--seed", 1)
+    assert other.exit_code == 1 and "with other settings" in other.output
+    assert "seed 0" in other.output and "seed 1" in other.output
+    replaced = run(source, "--frames", "0:1", "-o", out, "--seed", 1, "--overwrite")
+    assert replaced.exit_code == 0, replaced.output
+    assert json.loads((out / "f0.npz" / "result.json").read_text())["seed"] == 1
+
+
+def test_a_range_chooses_and_json_tells_each_frame(source, tmp_path):
+    out = tmp_path / "out"
+    result = run(source, "--frames", "0:4:3", "-o", out, "--json")
+    assert result.exit_code == 0, result.output
+    report = json.loads(result.stdout)
+    assert [each["frame"] for each in report["frames"]] == ["f0.npz", "f3.npz"]
+    assert [each["objects"][0]["id"] for each in report["frames"]] == [1, 1]
+
+
+def test_units_and_masks_are_noted_for_the_first_frame_alone(source, tmp_path):
+    for path in sorted(source.glob("*.npz")):
+        if path.name != "f2.npz":
+            frame = load_frame(path)
+            save_frame(replace(frame, segmap=np.zeros_like(frame.segmap)), path)
+    result = run(source, "--frames", ":2", "-o", tmp_path / "out")
+    assert result.exit_code == 0, result.output
+    assert result.stderr.count("Masks: made on the way") == 1
+    assert {p.name for p in (tmp_path / "out").glob("*.png")} == {
+        "f0.npz.masks.png",
+        "f1.npz.masks.png",
+    }
+
+
+@pytest.mark.parametrize(
+    ("arguments", "says"),
+    [
+        (["--frames", "3"], "--index N"),
+        (["--frames", "a:b"], "no range"),
+        (["--frames", "9:"], "none of the 4 frames"),
+        (["--frames", ":", "--index", "1"], "exclude each other"),
+        (["--frames", ":", "--view"], "--html"),
+    ],
+)
+def test_what_does_not_go_with_many_frames_is_a_usage_error(arguments, says, source, tmp_path):
+    result = run(source, *arguments, "-o", tmp_path / "out")
+    assert result.exit_code == 2 and says in result.output
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_folder_of_other_things_is_not_mixed_with(source, tmp_path):
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / "thesis.tex").touch()
+    for more in ([], ["--overwrite"]):
+        result = run(source, "--frames", ":", "-o", tmp_path / "out", *more)
+        assert result.exit_code == 1 and "holds other things" in result.output
+    assert [p.name for p in (tmp_path / "out").iterdir()] == ["thesis.tex"]
+
+
+@pytest.mark.parametrize("command", ["reconstruct", "frame", "segment"])
+def test_list_says_what_a_source_holds_and_writes_nothing(command, source):
+    before = sorted(source.parent.iterdir())
+    result = CliRunner().invoke(main, [command, str(source), "--list"])
+    assert result.exit_code == 0, result.output
+    assert "4 frames" in result.output
+    assert [line.split() for line in result.output.splitlines() if ".npz" in line] == [
+        [str(i), f"f{i}.npz"] for i in range(4)
+    ]
+    assert sorted(source.parent.iterdir()) == before
+    none = CliRunner().invoke(main, [command, "--list"])
+    assert none.exit_code == 2 and "SOURCE" in none.output
