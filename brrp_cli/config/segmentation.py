@@ -42,9 +42,9 @@ class TableConfig:
     """
 
     points: int = 40_000
-    ransac_points: int = 4_000
+    ransac_points: int = 2_000
     min_points: int = 100
-    iterations: int = 1000
+    iterations: int = 500
     tolerance: float = 0.01
     candidates: int = 3
     least: float = share(0.05)

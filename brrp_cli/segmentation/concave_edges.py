@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from brrp_cli.config.segmentation import ConcaveEdgesConfig
 
-Array = NDArray[np.float64]
+Array = NDArray[np.floating]
 
 
 def surface_normals(points: Array, config: ConcaveEdgesConfig) -> Array:
@@ -20,9 +20,11 @@ def surface_normals(points: Array, config: ConcaveEdgesConfig) -> Array:
     padded = np.pad(points, ((step, step), (step, step), (0, 0)), constant_values=np.nan)
     across = padded[step:-step, 2 * step :] - padded[step:-step, : -2 * step]
     down = padded[2 * step :, step:-step] - padded[: -2 * step, step:-step]
-    normals = np.cross(down, across)
+    normals = np.empty_like(down)
+    for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
+        normals[..., i] = down[..., j] * across[..., k] - down[..., k] * across[..., j]
     with np.errstate(invalid="ignore", divide="ignore"):
-        normals /= np.linalg.norm(normals, axis=-1, keepdims=True)
+        normals /= np.sqrt(_dot(normals, normals))[..., None]
     return normals
 
 
@@ -37,6 +39,7 @@ def hollow_creases(points: Array, normals: Array, config: ConcaveEdgesConfig) ->
     all_points = np.pad(points, pad, constant_values=np.nan)
     all_normals = np.pad(normals, pad, constant_values=np.nan)
     crease = np.zeros((height, width))
+    bent = np.cos(np.radians(config.flat))
     for down, right in ((0, reach), (reach, 0), (3, 3), (3, -3)):
         sides = []
         for sign in (1, -1):
@@ -46,12 +49,18 @@ def hollow_creases(points: Array, normals: Array, config: ConcaveEdgesConfig) ->
         (first, first_normal), (second, second_normal) = sides
         between = first - second
         with np.errstate(invalid="ignore"):
-            cosine = np.clip(np.sum(first_normal * second_normal, axis=-1), -1, 1)
-            hollow = np.sum((first_normal - second_normal) * between, axis=-1) < 0
-            near = np.linalg.norm(between, axis=-1) < config.near
-            sharp = (np.degrees(np.arccos(cosine)) - config.flat) / (config.sharp - config.flat)
-        crease = np.maximum(crease, np.where(hollow & near, np.nan_to_num(sharp), 0.0))
+            cosine = _dot(first_normal, second_normal)
+            hollow = _dot(first_normal - second_normal, between) < 0
+            near = _dot(between, between) < config.near**2
+            found = hollow & near & (cosine < bent)
+        angle = np.degrees(np.arccos(np.clip(cosine[found], -1, 1)))
+        sharp = (angle - config.flat) / (config.sharp - config.flat)
+        crease[found] = np.maximum(crease[found], sharp)
     return np.clip(crease, 0.0, 1.0)
+
+
+def _dot(first: Array, second: Array) -> Array:
+    return np.asarray(np.einsum("...i,...i->...", first, second))
 
 
 def depth_jumps(depth: Array, K: Array, config: ConcaveEdgesConfig) -> NDArray[np.bool_]:

@@ -40,7 +40,7 @@ def segment(frame: Frame, seed: int = 0, config: SegmentConfig | None = None) ->
     raw = np.where(frame.valid, frame.points[..., 2], np.nan)
     smoothing = config.smooth_depth
     depth = smooth_depth(np.where(flying_pixels(raw, smoothing), np.nan, raw), smoothing)
-    points = backproject(depth, frame.K).astype(np.float64)
+    points = backproject(depth, frame.K)
     valid = np.isfinite(depth)
     if valid.sum() < MIN_SHARE * valid.size:
         raise FrameError(
