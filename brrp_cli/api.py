@@ -8,6 +8,7 @@ result.objects[0].surface.as_trimesh()
 from __future__ import annotations
 
 import time
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -18,7 +19,7 @@ from brrp_cli.methods.configuration import MethodConfig
 from brrp_cli.methods.posterior_file import open_posterior
 from brrp_cli.methods.registry import DEFAULT, reconstructing_method
 from brrp_cli.prior.store import Prior
-from brrp_cli.reconstruction import Reconstruction
+from brrp_cli.reconstruction import ObjectReconstruction, Reconstruction
 from brrp_cli.results import read
 from brrp_cli.results.read import StoredResult
 
@@ -37,6 +38,7 @@ def reconstruct(
     seed: int = 0,
     device: str = "auto",
     workers: int | None = None,
+    kept: Sequence[ObjectReconstruction] = (),
 ) -> Reconstruction:
     """Reconstruct every object of a segmented frame.
 
@@ -46,6 +48,8 @@ def reconstruct(
         appearance
     weights : a file of what the method was trained to
     workers : objects at a time, by default as many as there are cores
+    kept : objects of an earlier reconstruction of this frame that are taken over as they are (by
+        the method brrp)
 
     An object that cannot be reconstructed gets a status; the others still are. The frame is never
     changed. The same seed gives the same result, whatever the number of workers.
@@ -62,6 +66,7 @@ def reconstruct(
         retriever=retriever,
         weights=None if weights is None else Path(weights),
         workers=workers,
+        kept={item.object_id: item for item in kept},
     )
     chosen.check(setup)
     start = time.perf_counter()

@@ -9,7 +9,7 @@ for frame in camera:
 from __future__ import annotations
 
 import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
@@ -18,10 +18,11 @@ from brrp_cli.api import reconstruct
 from brrp_cli.config.segmentation import SegmentConfig
 from brrp_cli.errors import FrameError
 from brrp_cli.frames.frame import Frame
+from brrp_cli.mending import mend
 from brrp_cli.methods.configuration import MethodConfig
 from brrp_cli.methods.registry import DEFAULT, reconstructing_method
 from brrp_cli.prior.store import Prior, open_prior
-from brrp_cli.reconstruction import Reconstruction
+from brrp_cli.reconstruction import ObjectReconstruction, Reconstruction
 
 if TYPE_CHECKING:
     from brrp_cli.retrieval.base import Retriever
@@ -77,15 +78,26 @@ class Reconstructor:
             self._segmenter = PromptSegmenter(masks_dir, self._segmentation)
 
     def __call__(self, frame: Frame) -> Reconstruction:
-        """All objects of one frame; masks are made where it has none, which `seconds` tells.
+        """All objects of one frame; masks are made where it has none, which `seconds` tells, and
+        mended by what is recognised.
 
         Errors: BrrpError; FrameError if nothing stands on the table.
         """
         start = time.perf_counter()
         masked = frame if frame.object_ids else self._with_masks(frame)
         seconds = time.perf_counter() - start
-        result = reconstruct(
-            masked,
+        result = self._reconstruct(masked)
+        result.seconds["masks"] = seconds
+        if masked is frame:
+            return result
+        result = mend(result, self._prior, self._reconstruct, self._segmentation.mend)
+        return replace(result, segmentation=asdict(self._segmentation))
+
+    def _reconstruct(
+        self, frame: Frame, kept: Sequence[ObjectReconstruction] = ()
+    ) -> Reconstruction:
+        return reconstruct(
+            frame,
             self._prior,
             method=self._method,
             config=self._config,
@@ -94,11 +106,8 @@ class Reconstructor:
             seed=self._seed,
             device=self._device,
             workers=self._workers,
+            kept=kept,
         )
-        result.seconds["masks"] = seconds
-        if masked is frame:
-            return result
-        return replace(result, segmentation=asdict(self._segmentation))
 
     def stream(self, frames: Iterable[Frame]) -> Iterator[Reconstruction | FrameError]:
         """One answer for each frame: a frame that cannot be used gives its error and ends

@@ -150,6 +150,28 @@ class ConcavitiesConfig:
 
 
 @dataclass(frozen=True)
+class BordersConfig:
+    """Borders of masks, moved to where colour changes.
+
+    inner, outer : pixels on both sides of a border that are uncertain; ring : pixels around a mask
+    in which the background's colours are taken
+    levels : of each channel; blur : levels, deviation, by which histograms are smoothed; floor : of
+    the share of any colour
+    depth : log odds with which depth's own answer counts
+    least : pixels that tell the colours of one side, or borders stay
+    """
+
+    inner: float = 8.0
+    outer: float = 8.0
+    ring: int = between(40, 1, 1000)
+    levels: int = between(16, 2, 256)
+    blur: float = 1.0
+    floor: float = share(0.001)
+    depth: float = 0.5
+    least: int = 50
+
+
+@dataclass(frozen=True)
 class PromptConfig:
     """Masks of what a prompt names.
 
@@ -171,6 +193,39 @@ class PromptConfig:
     height: float = 0.006
     min_pixels: int = 50
     piece: float = share(0.2)
+
+
+@dataclass(frozen=True)
+class MendConfig:
+    """Masks mended by recognised objects.
+
+    rounds : times that masks are mended and changed objects are reconstructed again; 0 = never
+    least_weight : of a recognised object that may change masks; own : part of its own mask that it
+        explains at least
+    noise, noise_growth : standard deviation of depth, noise + noise_growth * depth^2 metres; within
+        `sigmas` of it, and of `pose` metres by which a right placement may be off, rendered depth
+        explains measured depth; beyond `sure` times that a pixel is something else's
+    claimed : explained part of a mask that is taken over
+    silhouette : pixels beside the rendered silhouette that may still be the object's
+    opening : half the width, pixels, of what is too thin to be a group
+    least_pixels, least_part : pixels of a group that is given back, and their part of the mask
+    table : metres; a group no higher is background
+    """
+
+    rounds: int = between(1, 0, 2)
+    least_weight: float = share(0.8)
+    own: float = share(0.5)
+    noise: float = 0.002
+    noise_growth: float = 0.003
+    sigmas: float = 3.0
+    pose: float = 0.002
+    sure: float = 1.5
+    claimed: float = share(0.7)
+    silhouette: int = between(4, 0, 64)
+    opening: int = between(3, 1, 64)
+    least_pixels: int = 200
+    least_part: float = share(0.05)
+    table: float = 0.012
 
 
 @dataclass(frozen=True)
@@ -202,4 +257,6 @@ class SegmentConfig:
     footprints: FootprintsConfig = field(default_factory=FootprintsConfig)
     vivid_colour: VividColourConfig = field(default_factory=VividColourConfig)
     concavities: ConcavitiesConfig = field(default_factory=ConcavitiesConfig)
+    borders: BordersConfig = field(default_factory=BordersConfig)
+    mend: MendConfig = field(default_factory=MendConfig)
     prompt: PromptConfig = field(default_factory=PromptConfig)

@@ -7,7 +7,7 @@ Python, the commands, sessions and evaluations find it there; nothing else has t
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -17,7 +17,7 @@ from brrp_cli.methods.configuration import MethodConfig
 if TYPE_CHECKING:
     from brrp_cli.frames.frame import Frame
     from brrp_cli.prior.store import Prior
-    from brrp_cli.reconstruction import Reconstruction, StoredPosterior
+    from brrp_cli.reconstruction import ObjectReconstruction, Reconstruction, StoredPosterior
     from brrp_cli.retrieval.base import Retriever
 
 
@@ -28,6 +28,7 @@ class Setup:
     config : one of its presets, or a changed one; device : "auto", "cpu" or "cuda"
     prior, retriever, weights : only where the method uses them
     workers : objects at a time; None = as many as there are cores. Results do not depend on it
+    kept : what is known already, by object id; a method that recognises objects gives it back
     """
 
     config: Any
@@ -37,6 +38,7 @@ class Setup:
     retriever: Retriever | None = None
     weights: Path | None = None
     workers: int | None = None
+    kept: Mapping[int, ObjectReconstruction] = field(default_factory=dict)
 
 
 def _no_posteriors() -> tuple[type[StoredPosterior], ...]:

@@ -61,6 +61,8 @@ def run(frame: Frame, setup: Setup) -> Reconstruction:
         )
 
     def whole(object_id: int) -> ObjectReconstruction:
+        if object_id in setup.kept:
+            return setup.kept[object_id]
         if object_id in scene.too_few:
             return too_few(object_id, scene.too_few[object_id], config.observation.min_points)
         return with_surface(object_id, partial(one, scene.objects[object_id]), config.surface)

@@ -19,6 +19,7 @@ from brrp_cli.segmentation.components import absorb_small, find_parts, join_part
 from brrp_cli.segmentation.concave_edges import depth_jumps, hollow_creases, surface_normals
 from brrp_cli.segmentation.fill_concavities import fill_inside
 from brrp_cli.segmentation.merge_by_footprint import join_on_one_spot
+from brrp_cli.segmentation.refine_borders import refine_borders
 from brrp_cli.segmentation.region_growing import fill_holes, grow
 from brrp_cli.segmentation.smooth_depth import flying_pixels, smooth_depth
 from brrp_cli.segmentation.table_plane import find_table
@@ -76,7 +77,8 @@ def segment(frame: Frame, seed: int = 0, config: SegmentConfig | None = None) ->
     edges = frame.valid & ~valid & (table.plane.signed_distance(frame.points) > config.rim * lift)
     points = np.where(edges[..., None], frame.points, points)
     segmap = grow(segmap, points, rim | edges, config.reach)
-    segmap = fill_inside(segmap, table.plan(points), floor, config.concavities)
+    filled = fill_inside(segmap, table.plan(points), floor, config.concavities)
+    segmap = refine_borders(filled, frame.rgb, filled != segmap, config.borders)
     segmap = fill_holes(segmap, ~frame.valid)
     return _numbered(segmap, frame, config.min_area)
 
