@@ -30,6 +30,13 @@ _OPTIONS = [
         "camera_info.",
     ),
     click.option("--masks", type=_PATH, help="Object ids: grey PNG or .npy, 0 = background."),
+    click.option(
+        "--all",
+        "keep_all",
+        is_flag=True,
+        help="With masks without a model: also of what the image's border cuts or that stands"
+        " nowhere on the table.",
+    ),
     click.option("--index", metavar="N|NAME", help="Which frame, where SOURCE holds many."),
     click.option("--color-topic", help="Of a ROS bag, where several would do."),
     click.option("--depth-topic", help="Of a ROS bag; aligned to the colour camera."),
@@ -48,7 +55,7 @@ _OPTIONS = [
 def source_options(function: Callable[..., Any]) -> Callable[..., Any]:
     """Add the options; they reach the command as its keyword `source`, a `SourceOptions`."""
     names = ["color", "depth", "intrinsics", "masks", "index", "color_topic", "depth_topic"]
-    names += ["depth_scale", "prompt", "masks_dir"]
+    names += ["depth_scale", "prompt", "masks_dir", "keep_all"]
 
     # Its help, and the options that decorators below have left there, come along.
     @wraps(function)
@@ -77,6 +84,7 @@ class SourceOptions:
     depth_scale: float | None = None
     prompt: str | None = None
     masks_dir: Path | None = None
+    keep_all: bool = False
 
     def check(self) -> None:
         """UsageError for what does not go together."""
@@ -91,6 +99,8 @@ class SourceOptions:
             raise click.UsageError("--index and topics choose from a SOURCE, not from images")
         if self.masks is not None and self.prompt is not None:
             raise click.UsageError("--masks and --prompt exclude each other")
+        if self.keep_all and (self.masks is not None or self.prompt is not None):
+            raise click.UsageError("--all goes with masks that are made without a model")
         if self.masks_dir is not None and self.prompt is None:
             raise click.UsageError("--masks-dir goes with --prompt")
 
@@ -130,7 +140,7 @@ class SourceOptions:
         from brrp_cli.segmentation.segment import segment
 
         if self.prompt is None:
-            return replace(frame, segmap=segment(frame, seed, config))
+            return replace(frame, segmap=segment(frame, seed, config, keep_all=self.keep_all))
         from brrp_cli.segmentation.prompted.segment_by_prompt import PromptSegmenter
 
         segmenter = PromptSegmenter(self.masks_dir, config)

@@ -150,6 +150,27 @@ class ConcavitiesConfig:
 
 
 @dataclass(frozen=True)
+class StacksConfig:
+    """Things of plain colour stacked flush.
+
+    lightness : weight of CIE L* beside a* and b*: shading changes it
+    step : metres of the heights at which a cut is looked for; least_height : metres on both sides
+    apart : distance of both sides' colours; plain : part of the variance of colour that lies
+        between both sides at least
+    beside : metres on both sides of the seam in which their widths are compared; width : the
+        narrower one's, as part of the wider one's
+    """
+
+    lightness: float = 0.5
+    step: float = 0.004
+    least_height: float = 0.025
+    apart: float = 20.0
+    plain: float = share(0.75)
+    beside: float = 0.012
+    width: float = share(0.6)
+
+
+@dataclass(frozen=True)
 class BordersConfig:
     """Borders of masks, moved to where colour changes.
 
@@ -193,6 +214,27 @@ class PromptConfig:
     height: float = 0.006
     min_pixels: int = 50
     piece: float = share(0.2)
+
+
+@dataclass(frozen=True)
+class LeftOutConfig:
+    """Masks of what is cut by the image's border or stands nowhere on the support surface.
+
+    cut : part of a mask's outline on the image's border from which on it is left out
+    lowest : percentile of its heights that counts as its lower end; stands : metres; what ends no
+        higher stands on the table
+    foot : percentile of its outline's heights up to which the outline is its foot; reach : pixels
+        from the foot that are looked at; touch : metres in depth of what touches it; held : part of
+        them that are nearer, or another object that touches it, in which case it may stand
+    """
+
+    cut: float = share(0.08)
+    lowest: float = between(5.0, 0.0, 100.0)
+    stands: float = 0.04
+    foot: float = between(25.0, 0.0, 100.0)
+    reach: int = between(6, 1, 64)
+    touch: float = 0.02
+    held: float = share(0.25)
 
 
 @dataclass(frozen=True)
@@ -257,6 +299,8 @@ class SegmentConfig:
     footprints: FootprintsConfig = field(default_factory=FootprintsConfig)
     vivid_colour: VividColourConfig = field(default_factory=VividColourConfig)
     concavities: ConcavitiesConfig = field(default_factory=ConcavitiesConfig)
+    stacks: StacksConfig = field(default_factory=StacksConfig)
     borders: BordersConfig = field(default_factory=BordersConfig)
+    left_out: LeftOutConfig = field(default_factory=LeftOutConfig)
     mend: MendConfig = field(default_factory=MendConfig)
     prompt: PromptConfig = field(default_factory=PromptConfig)

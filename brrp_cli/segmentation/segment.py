@@ -7,6 +7,8 @@ other (a mug's walls), or that are of one vivid colour on one spot, are joined a
 
 from __future__ import annotations
 
+import logging
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -18,18 +20,27 @@ from brrp_cli.geometry import backproject
 from brrp_cli.segmentation.components import absorb_small, find_parts, join_parts
 from brrp_cli.segmentation.concave_edges import depth_jumps, hollow_creases, surface_normals
 from brrp_cli.segmentation.fill_concavities import fill_inside
+from brrp_cli.segmentation.left_out import left_out, told
 from brrp_cli.segmentation.merge_by_footprint import join_on_one_spot
 from brrp_cli.segmentation.refine_borders import refine_borders
 from brrp_cli.segmentation.region_growing import fill_holes, grow
 from brrp_cli.segmentation.smooth_depth import flying_pixels, smooth_depth
+from brrp_cli.segmentation.split_stacks import split_stacks
 from brrp_cli.segmentation.table_plane import find_table
+
+log = logging.getLogger(__name__)
 
 # Of the image, that must have depth which agrees with its neighbours'.
 MIN_SHARE = 0.01
 
 
-def segment(frame: Frame, seed: int = 0, config: SegmentConfig | None = None) -> NDArray[np.int64]:
+def segment(
+    frame: Frame, seed: int = 0, config: SegmentConfig | None = None, *, keep_all: bool = False
+) -> NDArray[np.int64]:
     """Masks (H, W) of the objects that stand on the table: 1, 2, ... from left to right.
+
+    keep_all : also of what the image's border cuts, and of what stands nowhere on the table
+        (left_out.py)
 
     The frame's own masks are not looked at; background, also behind the table, is 0, and so are
     pixels without depth but for small holes inside an object.
@@ -71,16 +82,36 @@ def segment(frame: Frame, seed: int = 0, config: SegmentConfig | None = None) ->
     parts = find_parts(risen, boundary, config.components)
     parts = join_parts(parts, boundary, config.border, config.components)
     parts = join_on_one_spot(parts, plan, height, table.plan(normals), meets, frame.rgb, config)
+    parts = split_stacks(parts, frame.rgb, height, config.stacks)
     small = _areas(parts, frame) < config.min_area
     segmap = absorb_small(parts, boundary, small)
     # Pixels at edges, which were left out of the smoothed depth, join what they lie next to.
     edges = frame.valid & ~valid & (table.plane.signed_distance(frame.points) > config.rim * lift)
     points = np.where(edges[..., None], frame.points, points)
     segmap = grow(segmap, points, rim | edges, config.reach)
+    # Specks would grow with their borders.
+    segmap = _large(segmap, frame, config.min_area)
     filled = fill_inside(segmap, table.plan(points), floor, config.concavities)
     segmap = refine_borders(filled, frame.rgb, filled != segmap, config.borders)
     segmap = fill_holes(segmap, ~frame.valid)
+    if not keep_all:
+        segmap = _without(segmap, raw, table.plane.signed_distance(frame.points), frame, config)
     return _numbered(segmap, frame, config.min_area)
+
+
+def _without(
+    segmap: NDArray[np.int64],
+    depth: NDArray[np.floating],
+    height: NDArray[np.float64],
+    frame: Frame,
+    config: SegmentConfig,
+) -> NDArray[np.int64]:
+    """The masks without those that are left out, which the log tells."""
+    segmap = _large(segmap, frame, config.min_area)
+    reasons = left_out(segmap, depth, height, config.left_out)
+    if reasons:
+        log.info("Masks left out: %s (--all keeps them)", told(reasons))
+    return np.where(np.isin(segmap, list(reasons)), BACKGROUND, segmap)
 
 
 def _lift(
@@ -101,6 +132,11 @@ def _areas(segmap: NDArray[np.int64], frame: Frame) -> NDArray[np.float64]:
     return np.asarray(np.bincount(segmap.ravel(), weights=area.ravel()), dtype=np.float64)
 
 
+def _large(segmap: NDArray[np.int64], frame: Frame, min_area: float) -> NDArray[np.int64]:
+    """The masks that show so many metres squared of themselves."""
+    return np.where(_areas(segmap, frame)[segmap] >= min_area, segmap, BACKGROUND)
+
+
 def _numbered(segmap: NDArray[np.int64], frame: Frame, min_area: float) -> NDArray[np.int64]:
     """The masks without small ones, numbered by the column of their middle."""
     areas = _areas(segmap, frame)
@@ -116,8 +152,8 @@ def _numbered(segmap: NDArray[np.int64], frame: Frame, min_area: float) -> NDArr
             where=frame.source,
             expected="objects that rise above their support plane",
             found=f"none that shows {min_area * 1e4:g} cm^2 of itself",
-            fix="check the unit of depth (--depth-scale), move the camera nearer, or pass masks"
-            " with --masks",
+            fix="check the unit of depth (--depth-scale), move the camera nearer, keep what the"
+            " image's border cuts (--all), or pass masks with --masks",
         )
     numbered = np.zeros_like(segmap)
     for number, old in enumerate(sorted(middles, key=lambda i: middles[i]), start=1):

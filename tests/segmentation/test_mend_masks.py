@@ -27,9 +27,7 @@ def mended(segmap, frame, placed, config=None):
     noise = np.random.default_rng(0).normal(0, 0.001, SHAPE)
     depth = frame.points[..., 2] + noise
     height = TABLE.signed_distance(frame.points)
-    return mend_masks(
-        segmap, depth, placed, height, np.full(SHAPE, 0.008), config or MendConfig()
-    )
+    return mend_masks(segmap, depth, placed, height, np.full(SHAPE, 0.008), config or MendConfig())
 
 
 def in_three(mask, ids):

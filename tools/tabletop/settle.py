@@ -3,7 +3,7 @@
 Every object collides as the convex hull of its mesh. On a plane this is exact, since a rigid body
 touches a plane with its hull only; among objects it is on the safe side: they never pass through
 each other, but nothing nests in a bowl or reaches through a handle. A convex decomposition would
-let them, for half a minute of work a mesh; in tools/tabletop/stack.py the lower objects do not move,
+let them, for half a minute of work a mesh. In tools/tabletop/stack.py lower objects stay put,
 and collide as they are.
 """
 
