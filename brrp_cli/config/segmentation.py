@@ -61,6 +61,7 @@ class ConcaveEdgesConfig:
     reach : pixels to each side across which a crease is looked for; normal_step : pixels of the
         difference quotients of normals
     flat, sharp : degrees between both sides' normals: no crease, and surely one
+    faint : part of `flat` and `sharp` that is enough where colour changes by `colour` levels of 255
     near : metres; sides farther apart are two surfaces, whatever their normals
     steep : slope beyond which depth jumps; jump : metres that it jumps at least
     """
@@ -69,6 +70,8 @@ class ConcaveEdgesConfig:
     normal_step: int = 2
     flat: float = between(30.0, 0.0, 180.0)
     sharp: float = between(60.0, 0.0, 180.0)
+    faint: float = share(0.5)
+    colour: float = 120.0
     near: float = 0.05
     steep: float = 6.0
     jump: float = 0.008
@@ -226,6 +229,8 @@ class LeftOutConfig:
     foot : percentile of its outline's heights up to which the outline is its foot; reach : pixels
         from the foot that are looked at; touch : metres in depth of what touches it; held : part of
         them that are nearer, or another object that touches it, in which case it may stand
+    edge : metres from the end of the seen table; a mask of which `edge_share` lies there and that
+        is no higher than `edge_height` metres is depth smeared over the table's edge
     """
 
     cut: float = share(0.08)
@@ -235,6 +240,9 @@ class LeftOutConfig:
     reach: int = between(6, 1, 64)
     touch: float = 0.02
     held: float = share(0.25)
+    edge: float = 0.02
+    edge_share: float = share(0.8)
+    edge_height: float = 0.03
 
 
 @dataclass(frozen=True)

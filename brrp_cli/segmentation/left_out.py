@@ -1,4 +1,5 @@
-"""Masks that are no whole object on the support surface: cut by the image's border, or in the air.
+"""Masks that are no whole object on the support surface: cut by the image's border, in the air, or
+depth that smears over the table's edge.
 
 What reaches into the image from outside is a part of something (an arm, a hand, a chair, the next
 object), and so is what rises above the table and stands on nothing: it belongs to what is beside
@@ -17,18 +18,21 @@ from brrp_cli.dependencies import import_library
 
 CUT = "cut by the image's border"
 IN_THE_AIR = "off the support surface"
+EDGE = "smeared over the table's edge"
 
 
 def left_out(
     segmap: NDArray[np.int64],
     depth: NDArray[np.floating],
     height: NDArray[np.floating],
+    middle: NDArray[np.bool_],
     config: LeftOutConfig,
 ) -> dict[int, str]:
-    """Why a mask is no whole object on the table, `CUT` or `IN_THE_AIR`, by id.
+    """Why a mask is no whole object on the table, `CUT`, `IN_THE_AIR` or `EDGE`, by id.
 
     segmap : (H, W), 0 = background; depth, height : (H, W) metres along z and above the support
-    plane, NaN = no return
+    plane, NaN = no return; middle : (H, W) pixels of masks over the table's middle, `config.edge`
+    from where it ends
     """
     ndimage = import_library("scipy.ndimage")
     reasons = {}
@@ -37,6 +41,10 @@ def left_out(
             continue
         if border_share(segmap == object_id) > config.cut:
             reasons[object_id] = CUT
+            continue
+        known = (segmap[box] == object_id) & np.isfinite(height[box])
+        if known.any() and _at_the_edge(middle[box][known], height[box][known], config):
+            reasons[object_id] = EDGE
             continue
         reach = config.reach
         window = tuple(
@@ -59,8 +67,15 @@ def border_share(mask: NDArray[np.bool_]) -> float:
 
 def told(reasons: Mapping[int, str]) -> str:
     """How many masks were left out and why, in words."""
-    kinds = [(reason, list(reasons.values()).count(reason)) for reason in (CUT, IN_THE_AIR)]
+    kinds = [(reason, list(reasons.values()).count(reason)) for reason in (CUT, IN_THE_AIR, EDGE)]
     return ", ".join(f"{count} {reason}" for reason, count in kinds if count)
+
+
+def _at_the_edge(
+    middle: NDArray[np.bool_], height: NDArray[np.floating], config: LeftOutConfig
+) -> bool:
+    low = np.percentile(height, 100 - config.lowest) < config.edge_height
+    return bool(low and 1 - middle.mean() >= config.edge_share)
 
 
 def _stands(

@@ -12,13 +12,19 @@ import logging
 import numpy as np
 from numpy.typing import NDArray
 
-from brrp_cli.config.segmentation import SegmentConfig
+from brrp_cli.config.segmentation import ConcaveEdgesConfig, SegmentConfig
 from brrp_cli.dependencies import import_library
 from brrp_cli.errors import FrameError
 from brrp_cli.frames.frame import BACKGROUND, Frame
 from brrp_cli.geometry import backproject
 from brrp_cli.segmentation.components import absorb_small, find_parts, join_parts
-from brrp_cli.segmentation.concave_edges import depth_jumps, hollow_creases, surface_normals
+from brrp_cli.segmentation.concave_edges import (
+    colour_edges,
+    depth_jumps,
+    hollow_angles,
+    strength,
+    surface_normals,
+)
 from brrp_cli.segmentation.fill_concavities import fill_inside
 from brrp_cli.segmentation.left_out import left_out, told
 from brrp_cli.segmentation.merge_by_footprint import join_on_one_spot
@@ -26,7 +32,7 @@ from brrp_cli.segmentation.refine_borders import refine_borders
 from brrp_cli.segmentation.region_growing import fill_holes, grow
 from brrp_cli.segmentation.smooth_depth import flying_pixels, smooth_depth
 from brrp_cli.segmentation.split_stacks import split_stacks
-from brrp_cli.segmentation.table_plane import find_table
+from brrp_cli.segmentation.table_plane import Table, find_table
 
 log = logging.getLogger(__name__)
 
@@ -74,7 +80,7 @@ def segment(
         rim = on_table & (height > config.rim * lift)
         floor = on_table & (height > -config.max_height)
     normals = surface_normals(points, config.concave_edges)
-    crease = hollow_creases(points, normals, config.concave_edges)
+    crease = _creases(points, normals, frame.rgb, config.concave_edges)
     jumps = depth_jumps(depth, frame.K, config.concave_edges)
     boundary = np.maximum(crease, jumps)
     # Across a jump nothing meets, however the surfaces on both sides lie.
@@ -95,20 +101,35 @@ def segment(
     segmap = refine_borders(filled, frame.rgb, filled != segmap, config.borders)
     segmap = fill_holes(segmap, ~frame.valid)
     if not keep_all:
-        segmap = _without(segmap, raw, table.plane.signed_distance(frame.points), frame, config)
+        segmap = _without(segmap, frame, table, config)
     return _numbered(segmap, frame, config.min_area)
 
 
+def _creases(
+    points: NDArray[np.floating],
+    normals: NDArray[np.floating],
+    rgb: NDArray[np.uint8],
+    config: ConcaveEdgesConfig,
+) -> NDArray[np.floating]:
+    """(H, W) hollow creases, 0 to 1: sharp ones, and faint ones where colour changes too."""
+    angles = hollow_angles(points, normals, config)
+    faint = strength(angles, config.faint * config.flat, config.faint * config.sharp)
+    return np.maximum(
+        strength(angles, config.flat, config.sharp), faint * colour_edges(rgb, config)
+    )
+
+
 def _without(
-    segmap: NDArray[np.int64],
-    depth: NDArray[np.floating],
-    height: NDArray[np.float64],
-    frame: Frame,
-    config: SegmentConfig,
+    segmap: NDArray[np.int64], frame: Frame, table: Table, config: SegmentConfig
 ) -> NDArray[np.int64]:
     """The masks without those that are left out, which the log tells."""
     segmap = _large(segmap, frame, config.min_area)
-    reasons = left_out(segmap, depth, height, config.left_out)
+    points = np.where(frame.valid[..., None], frame.points, np.nan)
+    middle = np.zeros(frame.shape, dtype=bool)
+    objects = (segmap != BACKGROUND) & frame.valid
+    middle[objects] = table.holds(table.plan(points[objects]), -config.left_out.edge)
+    height = table.plane.signed_distance(points)
+    reasons = left_out(segmap, points[..., 2], height, middle, config.left_out)
     if reasons:
         log.info("Masks left out: %s (--all keeps them)", told(reasons))
     return np.where(np.isin(segmap, list(reasons)), BACKGROUND, segmap)
