@@ -229,8 +229,8 @@ class LeftOutConfig:
     foot : percentile of its outline's heights up to which the outline is its foot; reach : pixels
         from the foot that are looked at; touch : metres in depth of what touches it; held : part of
         them that are nearer, or another object that touches it, in which case it may stand
-    edge : metres from the end of the seen table; a mask of which `edge_share` lies there and that
-        is no higher than `edge_height` metres is depth smeared over the table's edge
+    edge : metres; what is no higher than `edge_height` metres, and has nothing or what is so far
+        behind it in `edge_share` of the pixels around it, is depth smeared over the table's edge
     """
 
     cut: float = share(0.08)
@@ -240,8 +240,8 @@ class LeftOutConfig:
     reach: int = between(6, 1, 64)
     touch: float = 0.02
     held: float = share(0.25)
-    edge: float = 0.02
-    edge_share: float = share(0.8)
+    edge: float = 0.1
+    edge_share: float = share(0.4)
     edge_height: float = 0.03
 
 

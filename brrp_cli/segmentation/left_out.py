@@ -25,14 +25,12 @@ def left_out(
     segmap: NDArray[np.int64],
     depth: NDArray[np.floating],
     height: NDArray[np.floating],
-    middle: NDArray[np.bool_],
     config: LeftOutConfig,
 ) -> dict[int, str]:
     """Why a mask is no whole object on the table, `CUT`, `IN_THE_AIR` or `EDGE`, by id.
 
     segmap : (H, W), 0 = background; depth, height : (H, W) metres along z and above the support
-    plane, NaN = no return; middle : (H, W) pixels of masks over the table's middle, `config.edge`
-    from where it ends
+    plane, NaN = no return
     """
     ndimage = import_library("scipy.ndimage")
     reasons = {}
@@ -42,16 +40,17 @@ def left_out(
         if border_share(segmap == object_id) > config.cut:
             reasons[object_id] = CUT
             continue
-        known = (segmap[box] == object_id) & np.isfinite(height[box])
-        if known.any() and _at_the_edge(middle[box][known], height[box][known], config):
-            reasons[object_id] = EDGE
-            continue
         reach = config.reach
         window = tuple(
             slice(max(cut.start - reach, 0), min(cut.stop + reach, size))
             for cut, size in zip(box, segmap.shape, strict=True)
         )
-        if not _stands(segmap[window], object_id, depth[window], height[window], config):
+        mask = segmap[window] == object_id
+        if not (mask & np.isfinite(height[window])).any():
+            continue
+        if _at_the_edge(mask, depth[window], height[window], config):
+            reasons[object_id] = EDGE
+        elif not _stands(mask, segmap[window], depth[window], height[window], config):
             reasons[object_id] = IN_THE_AIR
     return reasons
 
@@ -72,25 +71,30 @@ def told(reasons: Mapping[int, str]) -> str:
 
 
 def _at_the_edge(
-    middle: NDArray[np.bool_], height: NDArray[np.floating], config: LeftOutConfig
+    mask: NDArray[np.bool_],
+    depth: NDArray[np.floating],
+    height: NDArray[np.floating],
+    config: LeftOutConfig,
 ) -> bool:
-    low = np.percentile(height, 100 - config.lowest) < config.edge_height
-    return bool(low and 1 - middle.mean() >= config.edge_share)
+    """Whether what is low has, around much of it, no table but what is far behind it."""
+    ndimage = import_library("scipy.ndimage")
+    if np.nanpercentile(height[mask], 100 - config.lowest) >= config.edge_height:
+        return False
+    around = ndimage.binary_dilation(mask, iterations=config.reach) & ~mask
+    farther = ~(depth[around] <= np.nanmedian(depth[mask]) + config.edge)
+    return bool(farther.sum() > config.edge_share * max(int(around.sum()), 1))
 
 
 def _stands(
+    mask: NDArray[np.bool_],
     segmap: NDArray[np.int64],
-    object_id: int,
     depth: NDArray[np.floating],
     height: NDArray[np.floating],
     config: LeftOutConfig,
 ) -> bool:
     """Whether a mask reaches down to the table, or something hides its foot or bears it."""
     ndimage = import_library("scipy.ndimage")
-    mask = segmap == object_id
     known = mask & np.isfinite(height)
-    if not known.any():
-        return True
     if np.percentile(height[known], config.lowest) < config.stands:
         return True
     # At the lower end of the outline: what is next to it, in the image?

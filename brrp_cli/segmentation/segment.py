@@ -125,11 +125,8 @@ def _without(
     """The masks without those that are left out, which the log tells."""
     segmap = _large(segmap, frame, config.min_area)
     points = np.where(frame.valid[..., None], frame.points, np.nan)
-    middle = np.zeros(frame.shape, dtype=bool)
-    objects = (segmap != BACKGROUND) & frame.valid
-    middle[objects] = table.holds(table.plan(points[objects]), -config.left_out.edge)
     height = table.plane.signed_distance(points)
-    reasons = left_out(segmap, points[..., 2], height, middle, config.left_out)
+    reasons = left_out(segmap, points[..., 2], height, config.left_out)
     if reasons:
         log.info("Masks left out: %s (--all keeps them)", told(reasons))
     return np.where(np.isin(segmap, list(reasons)), BACKGROUND, segmap)

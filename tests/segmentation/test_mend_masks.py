@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from table_scene import K, SHAPE, T_CAM_WORLD, TABLE, in_camera, photograph
+from table_scene import SHAPE, T_CAM_WORLD, TABLE, K, in_camera, photograph
 
 from brrp_cli.config.segmentation import MendConfig
 from brrp_cli.raycast import look

@@ -9,10 +9,16 @@ import pytest
 import trimesh
 from table_scene import T_CAM_WORLD, in_camera, photograph
 
-from brrp_cli.config.segmentation import BordersConfig, ConcavitiesConfig, VividColourConfig
+from brrp_cli.config.segmentation import (
+    BordersConfig,
+    ConcavitiesConfig,
+    LeftOutConfig,
+    VividColourConfig,
+)
 from brrp_cli.errors import FrameError
 from brrp_cli.frames.build import make_frame
 from brrp_cli.segmentation.fill_concavities import fill_inside
+from brrp_cli.segmentation.left_out import EDGE, left_out
 from brrp_cli.segmentation.merge_by_colour import same_hue, vivid_hues
 from brrp_cli.segmentation.refine_borders import refine_borders
 from brrp_cli.segmentation.segment import segment
@@ -178,7 +184,7 @@ def test_a_print_of_many_colours_is_no_seam():
 
 
 def test_what_the_border_cuts_is_kept_on_demand_alone():
-    frame = boxes(((0.1, 0.1, 0.06), 0, 0, 0), ((0.2, 0.1, 0.08), 0.0, 0.27, 0))
+    frame = boxes(((0.1, 0.1, 0.06), 0, 0, 0), ((0.1, 0.3, 0.08), 0.0, 0.33, 0))
     cut = frame.segmap == 2
     assert cut[:, [0, -1]].any() and cut.sum() > 300
     found = segment(frame)
@@ -210,3 +216,15 @@ def test_a_mask_that_bled_over_the_table_ends_where_colour_does():
     assert overlap(refined == 1, segmap == 1) > 0.95 > overlap(bled == 1, segmap == 1)
     grey = np.full_like(rgb, 128)
     assert overlap(refine_borders(bled, grey, nowhere, BordersConfig()) == 1, bled == 1) > 0.95
+
+
+def test_a_smear_at_the_tables_edge_is_told_from_a_flat_thing_on_it():
+    v, u = np.mgrid[:60, :80]
+    depth = np.where(v < 20, 2.0, 1.2 - 0.004 * v)
+    segmap = np.zeros((60, 80), np.int64)
+    segmap[20:24, 10:50] = 1
+    segmap[40:44, 10:50] = 2
+    height = np.where(segmap > 0, 0.012, 0.0)
+    assert left_out(segmap, depth, height, LeftOutConfig()) == {1: EDGE}
+    taller = np.where(segmap > 0, (u - 10) / 40 * 0.08, 0.0)
+    assert left_out(segmap, depth, taller, LeftOutConfig()) == {}
