@@ -9,7 +9,7 @@ for frame in camera:
 from __future__ import annotations
 
 import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
@@ -19,6 +19,7 @@ from brrp_cli.config.segmentation import SegmentConfig
 from brrp_cli.config.tracking import TrackConfig
 from brrp_cli.errors import FrameError
 from brrp_cli.frames.frame import Frame
+from brrp_cli.mending import mend
 from brrp_cli.methods.configuration import MethodConfig
 from brrp_cli.methods.registry import DEFAULT, reconstructing_method
 from brrp_cli.prior.store import Prior, open_prior
@@ -87,7 +88,8 @@ class Reconstructor:
             self._segmenter = PromptSegmenter(masks_dir, self._segmentation)
 
     def __call__(self, frame: Frame) -> Reconstruction:
-        """All objects of one frame; masks are made where it has none, which `seconds` tells.
+        """All objects of one frame; masks are made where it has none, which `seconds` tells, and
+        mended by what is recognised.
 
         Errors: BrrpError; FrameError if nothing stands on the table.
         """
@@ -98,6 +100,7 @@ class Reconstructor:
         result.seconds["masks"] = seconds
         if masked is frame:
             return result
+        result = mend(result, self._prior, self._all, self._segmentation.mend)
         return replace(result, segmentation=asdict(self._segmentation))
 
     def _tracked(self, frame: Frame) -> Reconstruction:
@@ -135,7 +138,7 @@ class Reconstructor:
         ]
         return [(frame, made) for frame, made in left if made.objects]
 
-    def _all(self, frame: Frame, only: set[int] | None = None) -> Reconstruction:
+    def _all(self, frame: Frame, only: Collection[int] | None = None) -> Reconstruction:
         return reconstruct(
             frame,
             self._prior,

@@ -18,6 +18,8 @@ and each with `--noise structured-light -o scenes/..._noise`. Sets to tune on: `
 bleeding silhouettes, steps and holes (docs/sensors.md); it takes the place of `--noise`.
 `--light varied` draws colour and brightness of the light, gamma and pixel noise for each scene;
 what stands where stays as it is.
+`--stack` drops every second object onto the one before it, which stands with its open side up
+where it has one: can on can, jar in bowl. It draws other scenes than a set without it.
 
 Objects collide as convex hulls (tools/tabletop/settle.py says what that means). A pixel without a
 return has depth buffer 1.0, the far plane.
@@ -83,6 +85,7 @@ def _size(_context: click.Context, _option: click.Parameter, value: str) -> tupl
 @click.option("--noise", default="none", show_default=True, type=click.Choice(list(LIMITS)))
 @click.option("--sensor", default="none", show_default=True, type=click.Choice(SENSOR_NAMES))
 @click.option("--light", default="plain", show_default=True, type=click.Choice(list(LIGHTS)))
+@click.option("--stack", "stacked", is_flag=True, help="Set objects on and into one another.")
 @click.option("--size", default="640x480", show_default=True, callback=_size)
 @click.option("--workers", default=1, show_default=True, type=click.IntRange(1))
 @click.option("--overwrite", is_flag=True, help="Replace scenes that are there.")
@@ -100,6 +103,7 @@ def main(
     noise: str,
     sensor: str,
     light: str,
+    stacked: bool,
     size: tuple[int, int],
     workers: int,
     overwrite: bool,
@@ -129,7 +133,9 @@ def main(
         found = tuple(path.absolute() for path in paths)
         if not found[0].is_relative_to(data_root):
             raise click.UsageError(f"{meshes} does not lie below --data-root {data_root}")
-        plan = Plan(found, data_root, output, seed, views, noise, size, overwrite, light, sensor)
+        plan = Plan(
+            found, data_root, output, seed, views, noise, size, overwrite, light, sensor, stacked
+        )
         _report(list(_make_all(plan, scenes, workers)), output)
     except BrrpError as error:
         raise click.ClickException(str(error)) from error

@@ -1,12 +1,12 @@
 """How good are masks without a model? IoU of `segment` against the true masks of made scenes.
 
-    python tools/score_masks.py SCENES... [--pictures FOLDER]
+    python tools/score_masks.py SCENES... [--pictures FOLDER] [--all]
 
 For each set of scenes (published layout, as tools/make_scenes.py writes it) one line: of all true
 objects with at least 150 pixels of valid depth, the mean IoU of the mask that fits each best (no
 mask is used twice), how many are found (IoU over 0.5) and well found (over 0.75); of all masks, how
 many fit no object (extra) and how many hold a good part of two objects (merged). Pixels without
-depth are left out.
+depth are left out, and so are objects that the image's border cuts, unless --all asks for them.
 """
 
 from __future__ import annotations
@@ -20,8 +20,10 @@ import numpy as np
 from PIL import Image
 from scipy.optimize import linear_sum_assignment
 
+from brrp_cli.config.segmentation import SegmentConfig
 from brrp_cli.errors import BrrpError
 from brrp_cli.ground_truth.scenes import find_scenes
+from brrp_cli.segmentation.left_out import border_share
 from brrp_cli.segmentation.mask_picture import draw_masks
 from brrp_cli.segmentation.segment import segment
 
@@ -45,11 +47,17 @@ def overlaps(true: np.ndarray, found: np.ndarray) -> tuple[np.ndarray, np.ndarra
     )
 
 
-def score(true: np.ndarray, found: np.ndarray, valid: np.ndarray) -> dict[str, list[float]]:
+def score(
+    true: np.ndarray, found: np.ndarray, valid: np.ndarray, keep_all: bool = False
+) -> dict[str, list[float]]:
     """IoU of each true object, and for each mask whether it is `extra` or `merged`."""
     sizes = np.bincount(np.maximum(true[valid], 0))
     small = np.flatnonzero((sizes > 0) & (sizes < MIN_PIXELS))
-    asked = valid & ~np.isin(true, small[small > 0])
+    not_asked = [i for i in small if i > 0]
+    if not keep_all:
+        limit = SegmentConfig().left_out.cut
+        not_asked += [i for i in np.flatnonzero(sizes) if i and border_share(true == i) > limit]
+    asked = valid & ~np.isin(true, not_asked)
     iou, part = overlaps(true[asked], found[asked])
     rows, columns = linear_sum_assignment(-iou)
     best = np.zeros(len(iou))
@@ -66,6 +74,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("scenes", type=Path, nargs="+")
     parser.add_argument("--pictures", type=Path, help="Draw the masks of every scene there.")
+    parser.add_argument("--all", action="store_true", help="Also what the image's border cuts.")
     parser.add_argument("--views", type=int, default=1)
     arguments = parser.parse_args()
     for folder in arguments.scenes:
@@ -75,11 +84,11 @@ def main() -> None:
             for view in range(min(arguments.views, len(scene.views))):
                 frame = scene.view(view)
                 try:
-                    found = segment(frame)
+                    found = segment(frame, keep_all=arguments.all)
                 except BrrpError as error:
                     print(f"{scene.name}: {error}", file=sys.stderr)
                     found = np.zeros(frame.shape, np.int64)
-                one = score(frame.segmap, found, frame.valid)
+                one = score(frame.segmap, found, frame.valid, arguments.all)
                 for name, values in one.items():
                     total[name] += values
                 frames += 1

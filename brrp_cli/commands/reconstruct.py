@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from dataclasses import asdict, replace
+from functools import partial
 from pathlib import Path
 from shlex import quote
 from typing import TYPE_CHECKING, Any
@@ -177,6 +178,7 @@ def command(
 
     from brrp_cli.api import open_result, reconstruct
     from brrp_cli.config.segmentation import SegmentConfig
+    from brrp_cli.mending import mend
     from brrp_cli.methods.config_file import read_config
     from brrp_cli.methods.configuration import as_record
     from brrp_cli.results.bop import bop_csv
@@ -212,21 +214,24 @@ def command(
     if prior is None:
         trained = "" if weights is None else f", weights {weights}"
         note(f"Method: {method}, without a prior{trained}")
+    run = partial(
+        reconstruct,
+        prior=prior,
+        method=method,
+        config=config,
+        retriever=retrieval,
+        weights=weights,
+        seed=seed,
+        device=device,
+        workers=workers,
+    )
 
     def one(frame: Frame, masks: SegmentConfig | None, output: Path) -> list[Told]:
         """Reconstruct a frame, write it all, and say what was written."""
-        result = reconstruct(
-            frame,
-            prior,
-            method=method,
-            config=config,
-            retriever=retrieval,
-            weights=weights,
-            seed=seed,
-            device=device,
-            workers=workers,
-        )
+        result = run(frame)
         if masks is not None:
+            result = mend(result, prior, lambda mended, ids: run(mended, only=ids), masks.mend)
+            tell_mended(frame, result.frame, output)
             result = replace(result, segmentation=asdict(masks))
         write_results(result, output, frame=coordinates, overwrite=overwrite)
         table = told(result)
@@ -298,6 +303,23 @@ def make_masks(
         " --drop 4 -o NEW.npz"
     )
     return frame
+
+
+def tell_mended(before: Frame, after: Frame, output: Path) -> None:
+    """Where recognised objects mended the masks, say so and draw them again."""
+    import numpy as np
+
+    from brrp_cli.segmentation.mask_picture import write_picture
+
+    if np.array_equal(before.segmap, after.segmap):
+        return
+    picture = output.with_name(output.name + ".masks.png")
+    write_picture(after, picture)
+    pixels = int((before.segmap != after.segmap).sum())
+    note(
+        f"Masks: mended by recognised objects in {pixels} pixels,"
+        f" {len(before.object_ids)} objects before, {len(after.object_ids)} after: {picture}"
+    )
 
 
 def check_collision(collision: str, confidence: float | None) -> None:

@@ -40,6 +40,13 @@ _OPTIONS = [
         type=_PATH,
         help="T_world_cam, camera to world, metres: 4 x 4 as JSON, .npy or text.",
     ),
+    click.option(
+        "--all",
+        "keep_all",
+        is_flag=True,
+        help="With masks without a model: also of what the image's border cuts or that stands"
+        " nowhere on the table.",
+    ),
     click.option("--index", metavar="N|NAME", help="Which frame, where SOURCE holds many."),
     click.option("--list", "lists", is_flag=True, help="Say what SOURCE holds, and do no more."),
     click.option("--color-topic", help="Of a ROS bag, where several would do."),
@@ -59,7 +66,7 @@ _OPTIONS = [
 def source_options(function: Callable[..., Any]) -> Callable[..., Any]:
     """Add the options; they reach the command as its keyword `source`, a `SourceOptions`."""
     names = ["color", "depth", "intrinsics", "masks", "camera_pose", "index", "color_topic"]
-    names += ["depth_topic", "depth_scale", "prompt", "masks_dir"]
+    names += ["depth_topic", "depth_scale", "prompt", "masks_dir", "keep_all"]
 
     # Its help, and the options that decorators below have left there, come along.
     @wraps(function)
@@ -100,6 +107,7 @@ class SourceOptions:
     depth_scale: float | None = None
     prompt: str | None = None
     masks_dir: Path | None = None
+    keep_all: bool = False
 
     def check(self) -> None:
         """UsageError for what does not go together."""
@@ -114,6 +122,8 @@ class SourceOptions:
             raise click.UsageError("--index and topics choose from a SOURCE, not from images")
         if self.masks is not None and self.prompt is not None:
             raise click.UsageError("--masks and --prompt exclude each other")
+        if self.keep_all and (self.masks is not None or self.prompt is not None):
+            raise click.UsageError("--all goes with masks that are made without a model")
         if self.masks_dir is not None and self.prompt is None:
             raise click.UsageError("--masks-dir goes with --prompt")
         for path in (self.path, self.color, self.depth, self.intrinsics, self.masks):
@@ -177,7 +187,7 @@ class SourceOptions:
         from brrp_cli.segmentation.segment import segment
 
         if self.prompt is None:
-            return replace(frame, segmap=segment(frame, seed, config))
+            return replace(frame, segmap=segment(frame, seed, config, keep_all=self.keep_all))
         return replace(
             frame, segmap=_prompt_segmenter(self.masks_dir, config)(frame, self.prompt, seed)
         )

@@ -42,9 +42,9 @@ class TableConfig:
     """
 
     points: int = 40_000
-    ransac_points: int = 4_000
+    ransac_points: int = 2_000
     min_points: int = 100
-    iterations: int = 1000
+    iterations: int = 500
     tolerance: float = 0.01
     candidates: int = 3
     least: float = share(0.05)
@@ -61,6 +61,7 @@ class ConcaveEdgesConfig:
     reach : pixels to each side across which a crease is looked for; normal_step : pixels of the
         difference quotients of normals
     flat, sharp : degrees between both sides' normals: no crease, and surely one
+    faint : part of `flat` and `sharp` that is enough where colour changes by `colour` levels of 255
     near : metres; sides farther apart are two surfaces, whatever their normals
     steep : slope beyond which depth jumps; jump : metres that it jumps at least
     """
@@ -69,6 +70,8 @@ class ConcaveEdgesConfig:
     normal_step: int = 2
     flat: float = between(30.0, 0.0, 180.0)
     sharp: float = between(60.0, 0.0, 180.0)
+    faint: float = share(0.5)
+    colour: float = 120.0
     near: float = 0.05
     steep: float = 6.0
     jump: float = 0.008
@@ -150,6 +153,49 @@ class ConcavitiesConfig:
 
 
 @dataclass(frozen=True)
+class StacksConfig:
+    """Things of plain colour stacked flush.
+
+    lightness : weight of CIE L* beside a* and b*: shading changes it
+    step : metres of the heights at which a cut is looked for; least_height : metres on both sides
+    apart : distance of both sides' colours; plain : part of the variance of colour that lies
+        between both sides at least
+    beside : metres on both sides of the seam in which their widths are compared; width : the
+        narrower one's, as part of the wider one's
+    """
+
+    lightness: float = 0.5
+    step: float = 0.004
+    least_height: float = 0.025
+    apart: float = 20.0
+    plain: float = share(0.75)
+    beside: float = 0.012
+    width: float = share(0.6)
+
+
+@dataclass(frozen=True)
+class BordersConfig:
+    """Borders of masks, moved to where colour changes.
+
+    inner, outer : pixels on both sides of a border that are uncertain; ring : pixels around a mask
+    in which the background's colours are taken
+    levels : of each channel; blur : levels, deviation, by which histograms are smoothed; floor : of
+    the share of any colour
+    depth : log odds with which depth's own answer counts
+    least : pixels that tell the colours of one side, or borders stay
+    """
+
+    inner: float = 8.0
+    outer: float = 8.0
+    ring: int = between(40, 1, 1000)
+    levels: int = between(16, 2, 256)
+    blur: float = 1.0
+    floor: float = share(0.001)
+    depth: float = 0.5
+    least: int = 50
+
+
+@dataclass(frozen=True)
 class PromptConfig:
     """Masks of what a prompt names.
 
@@ -171,6 +217,65 @@ class PromptConfig:
     height: float = 0.006
     min_pixels: int = 50
     piece: float = share(0.2)
+
+
+@dataclass(frozen=True)
+class LeftOutConfig:
+    """Masks of what is cut by the image's border or stands nowhere on the support surface.
+
+    cut : part of a mask's outline on the image's border from which on it is left out
+    lowest : percentile of its heights that counts as its lower end; stands : metres; what ends no
+        higher stands on the table
+    foot : percentile of its outline's heights up to which the outline is its foot; reach : pixels
+        from the foot that are looked at; touch : metres in depth of what touches it; held : part of
+        them that are nearer, or another object that touches it, in which case it may stand
+    edge : metres; what is no higher than `edge_height` metres, and has nothing or what is so far
+        behind it in `edge_share` of the pixels around it, is depth smeared over the table's edge
+    """
+
+    cut: float = share(0.08)
+    lowest: float = between(5.0, 0.0, 100.0)
+    stands: float = 0.04
+    foot: float = between(25.0, 0.0, 100.0)
+    reach: int = between(6, 1, 64)
+    touch: float = 0.02
+    held: float = share(0.25)
+    edge: float = 0.1
+    edge_share: float = share(0.4)
+    edge_height: float = 0.03
+
+
+@dataclass(frozen=True)
+class MendConfig:
+    """Masks mended by recognised objects.
+
+    rounds : times that masks are mended and changed objects are reconstructed again; 0 = never
+    least_weight : of a recognised object that may change masks; own : part of its own mask that it
+        explains at least
+    noise, noise_growth : standard deviation of depth, noise + noise_growth * depth^2 metres; within
+        `sigmas` of it, and of `pose` metres by which a right placement may be off, rendered depth
+        explains measured depth; beyond `sure` times that a pixel is something else's
+    claimed : explained part of a mask that is taken over
+    silhouette : pixels beside the rendered silhouette that may still be the object's
+    opening : half the width, pixels, of what is too thin to be a group
+    least_pixels, least_part : pixels of a group that is given back, and their part of the mask
+    table : metres; a group no higher is background
+    """
+
+    rounds: int = between(1, 0, 2)
+    least_weight: float = share(0.8)
+    own: float = share(0.5)
+    noise: float = 0.002
+    noise_growth: float = 0.003
+    sigmas: float = 3.0
+    pose: float = 0.002
+    sure: float = 1.5
+    claimed: float = share(0.7)
+    silhouette: int = between(4, 0, 64)
+    opening: int = between(3, 1, 64)
+    least_pixels: int = 200
+    least_part: float = share(0.05)
+    table: float = 0.012
 
 
 @dataclass(frozen=True)
@@ -202,4 +307,8 @@ class SegmentConfig:
     footprints: FootprintsConfig = field(default_factory=FootprintsConfig)
     vivid_colour: VividColourConfig = field(default_factory=VividColourConfig)
     concavities: ConcavitiesConfig = field(default_factory=ConcavitiesConfig)
+    stacks: StacksConfig = field(default_factory=StacksConfig)
+    borders: BordersConfig = field(default_factory=BordersConfig)
+    left_out: LeftOutConfig = field(default_factory=LeftOutConfig)
+    mend: MendConfig = field(default_factory=MendConfig)
     prompt: PromptConfig = field(default_factory=PromptConfig)

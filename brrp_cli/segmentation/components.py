@@ -64,7 +64,7 @@ def split_at_strongest(
 
 
 def contacts(
-    parts: NDArray[np.int64], crease: NDArray[np.float64], config: ComponentsConfig
+    parts: NDArray[np.int64], crease: NDArray[np.floating], config: ComponentsConfig
 ) -> NDArray[np.bool_]:
     """(n + 1, n + 1) whether two parts meet in a hollow crease (H, W), 0 to 1."""
     border, length = _borders(parts, crease)
@@ -101,7 +101,7 @@ def relabel(parts: NDArray[np.int64], same: NDArray[np.bool_]) -> NDArray[np.int
 
 
 def _borders(
-    parts: NDArray[np.int64], boundary: NDArray[np.float64]
+    parts: NDArray[np.int64], boundary: NDArray[np.floating]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Sum of the boundary along, and pixels of, every two parts' common border: (n + 1, n + 1)."""
     count = int(parts.max()) + 1

@@ -2,6 +2,7 @@
 
 What touches meets in a hollow crease (Stein et al., Object Partitioning using Local Convexity,
 CVPR 2014): a can on a table, two boxes side by side. Within one thing hollow creases are rarer.
+Cameras round creases off: a faint one counts where colour changes with it.
 """
 
 from __future__ import annotations
@@ -10,8 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brrp_cli.config.segmentation import ConcaveEdgesConfig
+from brrp_cli.dependencies import import_library
 
-Array = NDArray[np.float64]
+Array = NDArray[np.floating]
 
 
 def surface_normals(points: Array, config: ConcaveEdgesConfig) -> Array:
@@ -20,9 +22,11 @@ def surface_normals(points: Array, config: ConcaveEdgesConfig) -> Array:
     padded = np.pad(points, ((step, step), (step, step), (0, 0)), constant_values=np.nan)
     across = padded[step:-step, 2 * step :] - padded[step:-step, : -2 * step]
     down = padded[2 * step :, step:-step] - padded[: -2 * step, step:-step]
-    normals = np.cross(down, across)
+    normals = np.empty_like(down)
+    for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
+        normals[..., i] = down[..., j] * across[..., k] - down[..., k] * across[..., j]
     with np.errstate(invalid="ignore", divide="ignore"):
-        normals /= np.linalg.norm(normals, axis=-1, keepdims=True)
+        normals /= np.sqrt(_dot(normals, normals))[..., None]
     return normals
 
 
@@ -31,12 +35,26 @@ def hollow_creases(points: Array, normals: Array, config: ConcaveEdgesConfig) ->
 
     normals : (H, W, 3) unit, toward the camera
     """
+    return strength(hollow_angles(points, normals, config), config.flat, config.sharp)
+
+
+def strength(angles: Array, flat: float, sharp: float) -> Array:
+    """Creases (H, W) from 0, at `flat` degrees and less, to 1, at `sharp` and more."""
+    return np.clip((angles - flat) / (sharp - flat), 0.0, 1.0)
+
+
+def hollow_angles(points: Array, normals: Array, config: ConcaveEdgesConfig) -> Array:
+    """(H, W) degrees by which the surface of points (H, W, 3), metres, bends toward the camera, 0
+    where it is flat or bends away.
+
+    normals : (H, W, 3) unit, toward the camera
+    """
     height, width = points.shape[:2]
     reach = config.reach
     pad = ((reach, reach), (reach, reach), (0, 0))
     all_points = np.pad(points, pad, constant_values=np.nan)
     all_normals = np.pad(normals, pad, constant_values=np.nan)
-    crease = np.zeros((height, width))
+    least = np.ones((height, width))
     for down, right in ((0, reach), (reach, 0), (3, 3), (3, -3)):
         sides = []
         for sign in (1, -1):
@@ -46,12 +64,32 @@ def hollow_creases(points: Array, normals: Array, config: ConcaveEdgesConfig) ->
         (first, first_normal), (second, second_normal) = sides
         between = first - second
         with np.errstate(invalid="ignore"):
-            cosine = np.clip(np.sum(first_normal * second_normal, axis=-1), -1, 1)
-            hollow = np.sum((first_normal - second_normal) * between, axis=-1) < 0
-            near = np.linalg.norm(between, axis=-1) < config.near
-            sharp = (np.degrees(np.arccos(cosine)) - config.flat) / (config.sharp - config.flat)
-        crease = np.maximum(crease, np.where(hollow & near, np.nan_to_num(sharp), 0.0))
-    return np.clip(crease, 0.0, 1.0)
+            cosine = _dot(first_normal, second_normal)
+            hollow = _dot(first_normal - second_normal, between) < 0
+            near = _dot(between, between) < config.near**2
+            found = hollow & near & (cosine < least)
+        least[found] = cosine[found]
+    return np.degrees(np.arccos(np.clip(least, -1, 1)))
+
+
+def colour_edges(rgb: NDArray[np.uint8], config: ConcaveEdgesConfig) -> Array:
+    """(H, W) from 0, none, to 1, a change of colour by `config.colour` levels across the pixel or
+    near it: edges of depth and of colour lie a few pixels apart.
+
+    rgb : (H, W, 3)
+    """
+    ndimage = import_library("scipy.ndimage")
+    step = config.reach
+    smooth = ndimage.uniform_filter(rgb.astype(np.float32), size=(3, 3, 1))
+    smooth = np.pad(smooth, ((step, step), (step, step), (0, 0)), mode="edge")
+    across = smooth[step:-step, 2 * step :] - smooth[step:-step, : -2 * step]
+    down = smooth[2 * step :, step:-step] - smooth[: -2 * step, step:-step]
+    change = np.sqrt(np.maximum(_dot(across, across), _dot(down, down)))
+    return np.clip(ndimage.maximum_filter(change, size=step) / config.colour, 0.0, 1.0)
+
+
+def _dot(first: Array, second: Array) -> Array:
+    return np.asarray(np.einsum("...i,...i->...", first, second))
 
 
 def depth_jumps(depth: Array, K: Array, config: ConcaveEdgesConfig) -> NDArray[np.bool_]:

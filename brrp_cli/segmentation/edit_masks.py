@@ -54,7 +54,7 @@ def split(
     config = config or SegmentConfig()
     smoothing, edges = config.smooth_depth, config.concave_edges
     depth = smooth_depth(np.where(flying_pixels(raw, smoothing), np.nan, raw), smoothing)
-    points = backproject(depth, frame.K).astype(np.float64)
+    points = backproject(depth, frame.K)
     crease = hollow_creases(points, surface_normals(points, edges), edges)
     boundary = np.maximum(crease, depth_jumps(depth, frame.K, edges))
     parts = split_at_strongest(find_parts(mask, boundary, config.components), boundary, pieces)

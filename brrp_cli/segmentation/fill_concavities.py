@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brrp_cli.config.segmentation import ConcavitiesConfig
+from brrp_cli.dependencies import import_library
 from brrp_cli.segmentation.table_plane import convex_hull, in_hull
 
 
@@ -23,34 +24,57 @@ def fill_inside(
     them in half at most.
     plan : (H, W, 2) plan coordinates, metres.
     """
+    ndimage = import_library("scipy.ndimage")
     filled = segmap.copy()
-    free = candidates & (segmap == 0)
     cell = config.cell
-    for object_id in np.unique(segmap[segmap > 0]):
-        walls = plan[segmap == object_id]
+    for object_id, window in enumerate(ndimage.find_objects(segmap), start=1):
+        if window is None:
+            continue
+        # What lies inside the hull of the mask lies inside the box around it.
+        mask, near = segmap[window] == object_id, plan[window]
+        walls = near[mask]
         hull = convex_hull(walls)
         if hull is None:
             continue
-        low, high = walls.min(axis=0), walls.max(axis=0)
-        box = free & (plan >= low).all(axis=-1) & (plan <= high).all(axis=-1)
-        rows, columns = np.nonzero(box)
-        outline = convex_hull(np.argwhere(segmap == object_id).astype(np.float64))
-        inside = in_hull(hull, plan[rows, columns], -config.wall)
-        if outline is not None:
-            inside &= in_hull(outline, np.stack([rows, columns], axis=-1), 0.0)
+        rows, columns = np.nonzero(candidates[window] & (segmap[window] == 0))
+        inside = in_hull(hull, near[rows, columns], -config.wall)
         rows, columns = rows[inside], columns[inside]
+        outline = convex_hull(_outer(mask))
+        if outline is not None:
+            inside = in_hull(outline, np.stack([rows, columns], axis=-1), 0.0)
+            rows, columns = rows[inside], columns[inside]
         if len(rows) == 0:
             continue
-        cells, member = np.unique(np.floor(plan[rows, columns] / cell), axis=0, return_inverse=True)
-        walls = (np.unique(np.floor(walls / cell), axis=0) + 0.5) * cell
+        corner = np.floor(walls.min(axis=0) / cell).astype(np.int64)
+        cells, member = _cells(near[rows, columns], cell, corner)
+        walls = (_cells(walls, cell, corner)[0] + 0.5) * cell
         around = _sectors_seen((cells + 0.5) * cell, walls, config.sectors) >= config.around
-        chosen = around[member.reshape(-1)]
-        filled[rows[chosen], columns[chosen]] = object_id
+        chosen = around[member]
+        filled[window][rows[chosen], columns[chosen]] = object_id
     return filled
 
 
+def _outer(mask: NDArray[np.bool_]) -> NDArray[np.float64]:
+    """(m, 2) the first and the last pixel of each row: their hull is the mask's."""
+    rows = np.flatnonzero(mask.any(axis=1))
+    first = mask[rows].argmax(axis=1)
+    last = mask.shape[1] - 1 - mask[rows, ::-1].argmax(axis=1)
+    return np.stack([np.tile(rows, 2), np.concatenate([first, last])], axis=-1).astype(np.float64)
+
+
+def _cells(
+    plan: NDArray[np.float64], cell: float, corner: NDArray[np.int64]
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """The cells (m, 2) that plan points (n, 2), none beyond `corner`, lie in, and which of them
+    each does (n,)."""
+    cells = np.floor(plan / cell).astype(np.int64) - corner
+    width = int(cells[:, 1].max()) + 1
+    codes, member = np.unique(cells[:, 0] * width + cells[:, 1], return_inverse=True)
+    return np.stack([codes // width, codes % width], axis=-1) + corner, member.reshape(-1)
+
+
 def _sectors_seen(
-    centres: NDArray[np.float64], walls: NDArray[np.float64], sectors: int
+    centres: NDArray[np.floating], walls: NDArray[np.floating], sectors: int
 ) -> NDArray[np.int64]:
     """(n,) in how many sectors around each of the plan points (n, 2) wall points (m, 2) lie."""
     seen = np.zeros((len(centres), sectors), dtype=bool)

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brrp_cli.config.segmentation import VividColourConfig
+from brrp_cli.dependencies import import_library
 
 Array = NDArray[np.float64]
 
@@ -19,9 +20,12 @@ def vivid_hues(
     """
     hue, vivid = _hue(rgb, config)
     hues = np.full(int(parts.max()) + 1, np.nan)
-    for i in np.unique(parts[parts > 0]):
-        mask = parts == i
-        own = hue[mask & vivid]
+    ndimage = import_library("scipy.ndimage")
+    for i, window in enumerate(ndimage.find_objects(parts), start=1):
+        if window is None:
+            continue
+        mask = parts[window] == i
+        own = hue[window][mask & vivid[window]]
         if len(own) < config.vivid * mask.sum():
             continue
         mean = float(np.degrees(np.angle(np.exp(1j * np.radians(own)).mean())))

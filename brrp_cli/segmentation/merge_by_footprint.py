@@ -8,23 +8,28 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brrp_cli.config.segmentation import FootprintsConfig, SegmentConfig
+from brrp_cli.dependencies import import_library
 from brrp_cli.segmentation.components import contacts, relabel
 from brrp_cli.segmentation.merge_by_colour import same_hue, vivid_hues
 from brrp_cli.segmentation.table_plane import convex_hull, in_hull
 
-Array = NDArray[np.float64]
+Array = NDArray[np.floating]
+
+# No table has so many cells from its middle to its edge.
+_HALF = 2**24
 
 
 @dataclass(frozen=True)
 class Standing:
     """One part as it stands.
 
-    cells : of the plan, in the hull of its footprint; box : the lowest and highest of them;
+    cells : (n,) of the plan, in the hull of its footprint, as `_codes`, ascending; box : the lowest
+    and highest of them, (2,) each;
     middle : theirs, metres; plan, normals : (n, 2) its points and their normals in the plan;
     low, high : heights between which nine tenths of it lie, metres
     """
 
-    cells: frozenset[tuple[int, int]]
+    cells: NDArray[np.int64]
     box: tuple[NDArray[np.int64], NDArray[np.int64]]
     middle: Array
     plan: Array
@@ -58,9 +63,13 @@ def join_on_one_spot(
     """
     own = config.footprints
     count = int(parts.max()) + 1
+    ndimage = import_library("scipy.ndimage")
     standing = {
-        int(i): _standing(parts == i, plan, height, plan_normals, own.cell)
-        for i in np.unique(parts[parts > 0])
+        i: _standing(
+            parts[window] == i, plan[window], height[window], plan_normals[window], own.cell
+        )
+        for i, window in enumerate(ndimage.find_objects(parts), start=1)
+        if window is not None
     }
     touch = contacts(parts, crease, config.components)
     hues = vivid_hues(parts, rgb, config.vivid_colour)
@@ -71,7 +80,8 @@ def join_on_one_spot(
                 continue
             if _apart(first, second):
                 continue
-            shared = len(first.cells & second.cells) / min(len(first.cells), len(second.cells))
+            both = np.intersect1d(first.cells, second.cells, assume_unique=True)
+            shared = len(both) / min(len(first.cells), len(second.cells))
             if touch[i, j]:
                 pieces = shared > own.over and _hangs(first, second, own)
             else:
@@ -87,11 +97,11 @@ def join_on_one_spot(
 def _standing(
     mask: NDArray[np.bool_], plan: Array, height: Array, normals: Array, cell: float
 ) -> Standing:
-    cells = _filled(np.unique(np.floor(plan[mask] / cell).astype(np.int64), axis=0))
+    cells = _filled(_places(np.unique(_codes(np.floor(plan[mask] / cell).astype(np.int64)))))
     bottom, top = np.percentile(height[mask], (5, 95))
-    known = mask & np.isfinite(normals).all(axis=-1)
+    known = mask & np.isfinite(normals[..., 0])
     return Standing(
-        cells=frozenset((int(a), int(b)) for a, b in cells),
+        cells=np.sort(_codes(cells)),
         box=(cells.min(axis=0), cells.max(axis=0)),
         middle=(cells.mean(axis=0) + 0.5) * cell,
         plan=plan[known],
@@ -99,6 +109,16 @@ def _standing(
         low=float(bottom),
         high=float(top),
     )
+
+
+def _codes(cells: NDArray[np.int64]) -> NDArray[np.int64]:
+    """One number (...) for each cell (..., 2)."""
+    return np.asarray((cells[..., 0] + _HALF) * (2 * _HALF) + cells[..., 1] + _HALF)
+
+
+def _places(codes: NDArray[np.int64]) -> NDArray[np.int64]:
+    """The cells (n, 2) of codes (n,)."""
+    return np.stack([codes // (2 * _HALF), codes % (2 * _HALF)], axis=-1) - _HALF
 
 
 def _filled(cells: NDArray[np.int64]) -> NDArray[np.int64]:
@@ -122,8 +142,8 @@ def _apart(first: Standing, second: Standing) -> bool:
 
 def _gap(first: Standing, second: Standing) -> float:
     """What the hull of both footprints holds beside them, as a part of them."""
-    both = np.array(sorted(first.cells | second.cells), dtype=np.int64)
-    return len(_filled(both)) / len(both) - 1.0
+    both = np.union1d(first.cells, second.cells)
+    return len(_filled(_places(both))) / len(both) - 1.0
 
 
 def _inward(inner: Standing, outer: Standing, config: FootprintsConfig) -> float:
@@ -131,7 +151,7 @@ def _inward(inner: Standing, outer: Standing, config: FootprintsConfig) -> float
     it rises above `outer`."""
     if inner.high > outer.high + config.above:
         return 0.0
-    both = np.array(sorted(inner.cells | outer.cells), dtype=np.float64)
+    both = _places(np.union1d(inner.cells, outer.cells))
     toward = (both.mean(axis=0) + 0.5) * config.cell - inner.plan
     length = np.linalg.norm(toward, axis=-1, keepdims=True)
     facing = np.sum(toward * inner.normals, axis=-1) / np.maximum(length[:, 0], 1e-9)
@@ -154,8 +174,8 @@ def _walls(far: Standing, near: Standing, config: FootprintsConfig) -> bool:
 def _hangs(first: Standing, second: Standing, config: FootprintsConfig) -> bool:
     """Whether the upper of two that touch neither stands on the table nor lies on the lower."""
     lower, upper = (first, second) if first.low < second.low else (second, first)
-    middle = tuple(int(c) for c in np.floor(upper.middle / config.cell))
-    return upper.low > config.stands and middle not in lower.cells
+    middle = _codes(np.floor(upper.middle / config.cell).astype(np.int64))
+    return upper.low > config.stands and not np.isin(middle, lower.cells)
 
 
 def _at_one_height(first: Standing, second: Standing, config: FootprintsConfig) -> bool:

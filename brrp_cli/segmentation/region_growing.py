@@ -34,17 +34,19 @@ def fill_holes(labels: NDArray[np.int64], missing: NDArray[np.bool_]) -> NDArray
     missing : (H, W) pixels without depth
     """
     ndimage = import_library("scipy.ndimage")
-    filled = labels.copy()
     holes, count = ndimage.label(missing & (labels == 0))
-    for hole, window in enumerate(ndimage.find_objects(holes, max_label=count), start=1):
-        around = tuple(slice(max(cut.start - 1, 0), cut.stop + 1) for cut in window)
-        inside = holes[around] == hole
-        ring = ndimage.binary_dilation(inside) & ~inside
-        touched = np.unique(labels[around][ring])
-        on_border = any(
-            cut.start == 0 or cut.stop == size
-            for cut, size in zip(window, labels.shape, strict=True)
-        )
-        if len(touched) == 1 and touched[0] > 0 and not on_border:
-            filled[around][inside] = touched[0]
-    return filled
+    beside = []
+    for axis in (0, 1):
+        hole, label = np.moveaxis(holes, axis, 0), np.moveaxis(labels, axis, 0)
+        for near, far in ((np.s_[1:], np.s_[:-1]), (np.s_[:-1], np.s_[1:])):
+            ring = (hole[near] > 0) & (hole[far] == 0)
+            beside.append(np.stack([hole[near][ring], label[far][ring]], axis=-1))
+    # The image's border is like a label of its own, and so is the background.
+    for edge in (holes[0], holes[-1], holes[:, 0], holes[:, -1]):
+        beside.append(np.stack([edge, np.zeros_like(edge)], axis=-1))
+    pairs = np.unique(np.concatenate(beside), axis=0)
+    labels_beside = np.bincount(pairs[:, 0], minlength=count + 1)
+    fill = np.zeros(count + 1, dtype=np.int64)
+    alone = (labels_beside[pairs[:, 0]] == 1) & (pairs[:, 0] > 0)
+    fill[pairs[alone, 0]] = pairs[alone, 1]
+    return np.where(holes > 0, fill[holes], labels)

@@ -7,28 +7,46 @@ other (a mug's walls), or that are of one vivid colour on one spot, are joined a
 
 from __future__ import annotations
 
+import logging
+
 import numpy as np
 from numpy.typing import NDArray
 
-from brrp_cli.config.segmentation import SegmentConfig
+from brrp_cli.config.segmentation import ConcaveEdgesConfig, SegmentConfig
 from brrp_cli.dependencies import import_library
 from brrp_cli.errors import FrameError
 from brrp_cli.frames.frame import BACKGROUND, Frame
 from brrp_cli.geometry import backproject
 from brrp_cli.segmentation.components import absorb_small, find_parts, join_parts
-from brrp_cli.segmentation.concave_edges import depth_jumps, hollow_creases, surface_normals
+from brrp_cli.segmentation.concave_edges import (
+    colour_edges,
+    depth_jumps,
+    hollow_angles,
+    strength,
+    surface_normals,
+)
 from brrp_cli.segmentation.fill_concavities import fill_inside
+from brrp_cli.segmentation.left_out import left_out, told
 from brrp_cli.segmentation.merge_by_footprint import join_on_one_spot
+from brrp_cli.segmentation.refine_borders import refine_borders
 from brrp_cli.segmentation.region_growing import fill_holes, grow
 from brrp_cli.segmentation.smooth_depth import flying_pixels, smooth_depth
-from brrp_cli.segmentation.table_plane import find_table
+from brrp_cli.segmentation.split_stacks import split_stacks
+from brrp_cli.segmentation.table_plane import Table, find_table
+
+log = logging.getLogger(__name__)
 
 # Of the image, that must have depth which agrees with its neighbours'.
 MIN_SHARE = 0.01
 
 
-def segment(frame: Frame, seed: int = 0, config: SegmentConfig | None = None) -> NDArray[np.int64]:
+def segment(
+    frame: Frame, seed: int = 0, config: SegmentConfig | None = None, *, keep_all: bool = False
+) -> NDArray[np.int64]:
     """Masks (H, W) of the objects that stand on the table: 1, 2, ... from left to right.
+
+    keep_all : also of what the image's border cuts, and of what stands nowhere on the table
+        (left_out.py)
 
     The frame's own masks are not looked at; background, also behind the table, is 0, and so are
     pixels without depth but for small holes inside an object.
@@ -40,7 +58,7 @@ def segment(frame: Frame, seed: int = 0, config: SegmentConfig | None = None) ->
     raw = np.where(frame.valid, frame.points[..., 2], np.nan)
     smoothing = config.smooth_depth
     depth = smooth_depth(np.where(flying_pixels(raw, smoothing), np.nan, raw), smoothing)
-    points = backproject(depth, frame.K).astype(np.float64)
+    points = backproject(depth, frame.K)
     valid = np.isfinite(depth)
     if valid.sum() < MIN_SHARE * valid.size:
         raise FrameError(
@@ -62,7 +80,7 @@ def segment(frame: Frame, seed: int = 0, config: SegmentConfig | None = None) ->
         rim = on_table & (height > config.rim * lift)
         floor = on_table & (height > -config.max_height)
     normals = surface_normals(points, config.concave_edges)
-    crease = hollow_creases(points, normals, config.concave_edges)
+    crease = _creases(points, normals, frame.rgb, config.concave_edges)
     jumps = depth_jumps(depth, frame.K, config.concave_edges)
     boundary = np.maximum(crease, jumps)
     # Across a jump nothing meets, however the surfaces on both sides lie.
@@ -70,15 +88,48 @@ def segment(frame: Frame, seed: int = 0, config: SegmentConfig | None = None) ->
     parts = find_parts(risen, boundary, config.components)
     parts = join_parts(parts, boundary, config.border, config.components)
     parts = join_on_one_spot(parts, plan, height, table.plan(normals), meets, frame.rgb, config)
+    parts = split_stacks(parts, frame.rgb, height, config.stacks)
     small = _areas(parts, frame) < config.min_area
     segmap = absorb_small(parts, boundary, small)
     # Pixels at edges, which were left out of the smoothed depth, join what they lie next to.
     edges = frame.valid & ~valid & (table.plane.signed_distance(frame.points) > config.rim * lift)
     points = np.where(edges[..., None], frame.points, points)
     segmap = grow(segmap, points, rim | edges, config.reach)
-    segmap = fill_inside(segmap, table.plan(points), floor, config.concavities)
+    # Specks would grow with their borders.
+    segmap = _large(segmap, frame, config.min_area)
+    filled = fill_inside(segmap, table.plan(points), floor, config.concavities)
+    segmap = refine_borders(filled, frame.rgb, filled != segmap, config.borders)
     segmap = fill_holes(segmap, ~frame.valid)
+    if not keep_all:
+        segmap = _without(segmap, frame, table, config)
     return _numbered(segmap, frame, config.min_area)
+
+
+def _creases(
+    points: NDArray[np.floating],
+    normals: NDArray[np.floating],
+    rgb: NDArray[np.uint8],
+    config: ConcaveEdgesConfig,
+) -> NDArray[np.floating]:
+    """(H, W) hollow creases, 0 to 1: sharp ones, and faint ones where colour changes too."""
+    angles = hollow_angles(points, normals, config)
+    faint = strength(angles, config.faint * config.flat, config.faint * config.sharp)
+    return np.maximum(
+        strength(angles, config.flat, config.sharp), faint * colour_edges(rgb, config)
+    )
+
+
+def _without(
+    segmap: NDArray[np.int64], frame: Frame, table: Table, config: SegmentConfig
+) -> NDArray[np.int64]:
+    """The masks without those that are left out, which the log tells."""
+    segmap = _large(segmap, frame, config.min_area)
+    points = np.where(frame.valid[..., None], frame.points, np.nan)
+    height = table.plane.signed_distance(points)
+    reasons = left_out(segmap, points[..., 2], height, config.left_out)
+    if reasons:
+        log.info("Masks left out: %s (--all keeps them)", told(reasons))
+    return np.where(np.isin(segmap, list(reasons)), BACKGROUND, segmap)
 
 
 def _lift(
@@ -99,6 +150,11 @@ def _areas(segmap: NDArray[np.int64], frame: Frame) -> NDArray[np.float64]:
     return np.asarray(np.bincount(segmap.ravel(), weights=area.ravel()), dtype=np.float64)
 
 
+def _large(segmap: NDArray[np.int64], frame: Frame, min_area: float) -> NDArray[np.int64]:
+    """The masks that show so many metres squared of themselves."""
+    return np.where(_areas(segmap, frame)[segmap] >= min_area, segmap, BACKGROUND)
+
+
 def _numbered(segmap: NDArray[np.int64], frame: Frame, min_area: float) -> NDArray[np.int64]:
     """The masks without small ones, numbered by the column of their middle."""
     areas = _areas(segmap, frame)
@@ -114,8 +170,8 @@ def _numbered(segmap: NDArray[np.int64], frame: Frame, min_area: float) -> NDArr
             where=frame.source,
             expected="objects that rise above their support plane",
             found=f"none that shows {min_area * 1e4:g} cm^2 of itself",
-            fix="check the unit of depth (--depth-scale), move the camera nearer, or pass masks"
-            " with --masks",
+            fix="check the unit of depth (--depth-scale), move the camera nearer, keep what the"
+            " image's border cuts (--all), or pass masks with --masks",
         )
     numbered = np.zeros_like(segmap)
     for number, old in enumerate(sorted(middles, key=lambda i: middles[i]), start=1):

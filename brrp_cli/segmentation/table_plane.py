@@ -31,16 +31,21 @@ class Table:
         """Plan coordinates (..., 2), metres, of points (..., 3), camera frame."""
         return np.asarray(points @ self.axes.T, dtype=np.float64)
 
-    def holds(self, plan: NDArray[np.float64], margin: float) -> NDArray[np.bool_]:
+    def holds(self, plan: NDArray[np.floating], margin: float) -> NDArray[np.bool_]:
         """(n,) whether plan points (n, 2) lie on the table or at most `margin` beside it."""
         return in_hull(self.hull, plan, margin)
 
 
 def in_hull(
-    hull: NDArray[np.float64], plan: NDArray[np.float64], margin: float
+    hull: NDArray[np.float64], plan: NDArray[np.floating], margin: float
 ) -> NDArray[np.bool_]:
     """(n,) whether plan points (n, 2) lie in a hull (m, 3) grown by `margin`."""
-    return np.asarray((plan @ hull[:, :2].T + hull[:, 2] <= margin).all(axis=-1))
+    # Edge by edge: a table of all points and edges would not fit the cache.
+    x, y = np.ascontiguousarray(plan[:, 0]), np.ascontiguousarray(plan[:, 1])
+    inside = np.ones(len(plan), dtype=bool)
+    for a, b, c in hull:
+        inside &= a * x + b * y <= margin - c
+    return inside
 
 
 def convex_hull(plan: NDArray[np.float64]) -> NDArray[np.float64] | None:
@@ -93,7 +98,8 @@ def _largest_planes(
     rest = points
     least = config.least * len(points)
     for index in range(config.candidates):
-        if len(rest) < least:
+        # What is left could be neither a plane nor a table above the floor that was found.
+        if len(rest) < max(least, config.of_floor * max((n for _, n in planes), default=0)):
             break
         model = largest_plane(
             rest,

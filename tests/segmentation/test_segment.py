@@ -9,11 +9,18 @@ import pytest
 import trimesh
 from table_scene import T_CAM_WORLD, in_camera, photograph
 
-from brrp_cli.config.segmentation import ConcavitiesConfig, VividColourConfig
+from brrp_cli.config.segmentation import (
+    BordersConfig,
+    ConcavitiesConfig,
+    LeftOutConfig,
+    VividColourConfig,
+)
 from brrp_cli.errors import FrameError
 from brrp_cli.frames.build import make_frame
 from brrp_cli.segmentation.fill_concavities import fill_inside
+from brrp_cli.segmentation.left_out import EDGE, left_out
 from brrp_cli.segmentation.merge_by_colour import same_hue, vivid_hues
+from brrp_cli.segmentation.refine_borders import refine_borders
 from brrp_cli.segmentation.segment import segment
 from brrp_cli.shapes import solids
 
@@ -148,3 +155,78 @@ def test_a_mug_is_one_thing():
     depth = noisy(np.nan_to_num(clean.points[..., 2]))
     found = segment(make_frame(depth=depth, K=clean.K))
     assert overlap(found == 1, clean.segmap == 1) > 0.75
+
+
+def painted(frame, *colours):
+    rgb = np.full((*frame.shape, 3), 120, np.uint8)
+    for object_id, colour in enumerate(colours, start=1):
+        rgb[frame.segmap == object_id] = colour
+    return replace(frame, rgb=rgb)
+
+
+@pytest.mark.parametrize(
+    ("lower", "upper", "count"), [((40, 60, 160), (200, 180, 60), 2), ((40, 60, 160),) * 2 + (1,)]
+)
+def test_boxes_of_two_colours_stacked_flush_are_two(lower, upper, count):
+    frame = boxes(((0.1, 0.1, 0.07), 0, 0, 0), ((0.1, 0.1, 0.06), 0, 0, 0.07))
+    found = segment(painted(frame, lower, upper))
+    assert found.max() == count
+    if count == 2:
+        for truth in (1, 2):
+            assert max(overlap(found == i, frame.segmap == truth) for i in (1, 2)) > 0.7, truth
+
+
+def test_a_print_of_many_colours_is_no_seam():
+    rng = np.random.default_rng(0)
+    frame = boxes(((0.1, 0.1, 0.14), 0, 0, 0))
+    ink = np.array([(40, 60, 160), (200, 180, 60), (220, 220, 220)], np.uint8)
+    printed = ink[rng.integers(0, 3, (30, 40))].repeat(8, axis=0).repeat(8, axis=1)
+    rgb = np.where((frame.segmap == 1)[..., None], printed, np.uint8(120))
+    assert segment(replace(frame, rgb=rgb)).max() == 1
+
+
+def test_what_the_border_cuts_is_kept_on_demand_alone():
+    frame = boxes(((0.1, 0.1, 0.06), 0, 0, 0), ((0.1, 0.3, 0.08), 0.0, 0.33, 0))
+    cut = frame.segmap == 2
+    assert cut[:, [0, -1]].any() and cut.sum() > 300
+    found = segment(frame)
+    assert found.max() == 1
+    assert overlap(found == 1, frame.segmap == 1) > 0.7
+    everything = segment(frame, keep_all=True)
+    assert everything.max() == 2
+    assert max(overlap(everything == i, cut) for i in (1, 2)) > 0.7
+
+
+def test_what_hangs_in_the_air_is_left_out_and_what_stands_on_a_thing_is_not():
+    things = [((0.1, 0.1, 0.06), 0, 0, 0), ((0.06, 0.06, 0.06), 0, 0, 0.06)]
+    assert segment(boxes(*things)).max() == 2
+    hanging = boxes(things[0], ((0.06, 0.06, 0.06), -0.1, -0.15, 0.12))
+    assert segment(hanging).max() == 1
+    assert segment(hanging, keep_all=True).max() == 2
+
+
+def test_a_mask_that_bled_over_the_table_ends_where_colour_does():
+    segmap = np.zeros((80, 100), np.int64)
+    segmap[20:60, 30:70] = 1
+    rgb = np.full((80, 100, 3), (180, 160, 140), np.uint8)
+    rgb[segmap == 1] = (40, 90, 160)
+    rgb = (rgb + np.random.default_rng(0).normal(0, 5, rgb.shape)).clip(0, 255).astype(np.uint8)
+    bled = np.zeros_like(segmap)
+    bled[23:60, 24:70] = 1
+    nowhere = np.zeros(segmap.shape, bool)
+    refined = refine_borders(bled, rgb, nowhere, BordersConfig())
+    assert overlap(refined == 1, segmap == 1) > 0.95 > overlap(bled == 1, segmap == 1)
+    grey = np.full_like(rgb, 128)
+    assert overlap(refine_borders(bled, grey, nowhere, BordersConfig()) == 1, bled == 1) > 0.95
+
+
+def test_a_smear_at_the_tables_edge_is_told_from_a_flat_thing_on_it():
+    v, u = np.mgrid[:60, :80]
+    depth = np.where(v < 20, 2.0, 1.2 - 0.004 * v)
+    segmap = np.zeros((60, 80), np.int64)
+    segmap[20:24, 10:50] = 1
+    segmap[40:44, 10:50] = 2
+    height = np.where(segmap > 0, 0.012, 0.0)
+    assert left_out(segmap, depth, height, LeftOutConfig()) == {1: EDGE}
+    taller = np.where(segmap > 0, (u - 10) / 40 * 0.08, 0.0)
+    assert left_out(segmap, depth, taller, LeftOutConfig()) == {}

@@ -14,6 +14,7 @@ from tabletop.models import find_meshes, load_model
 from tabletop.render import FAR, NEAR, perspective
 from tabletop.scene import Plan, make_scene, noisy_buffer
 from tabletop.settle import drop
+from tabletop.stack import stack
 
 from brrp_cli.errors import MeshError
 from brrp_cli.geometry import transform_points
@@ -279,3 +280,31 @@ def test_noise_and_sensor_exclude_each_other(data, tmp_path):
     both = generate(data, tmp_path / "s", "--noise", "structured-light", "--sensor", "xtion")
     assert both.exit_code == 2
     assert "exclude each other" in both.output
+
+
+def test_stacked_objects_rest_on_and_in_one_another(data):
+    write_box(data / "stacks", "003_brick", (0.2, 0.2, 0.06), (0, 0, 0), (0, 255, 0))
+    outside = trimesh.creation.box((0.24, 0.24, 0.1))
+    tub = outside.difference(trimesh.creation.box((0.2, 0.2, 0.1)).apply_translation((0, 0, 0.02)))
+    tub.export(data / "tub.obj")
+    (brick,) = find_meshes(data / "stacks")
+    small = load_model(find_meshes(data / "meshes")[0])
+    models = [load_model(brick), small, load_model(data / "tub.obj"), small]
+    poses = stack(models, np.random.default_rng(0))
+    assert all(pose is not None for pose in poses)
+    lowest = [
+        float(pose.apply(model.hull + model.center)[:, 2].min())
+        for pose, model in zip(poses, models, strict=True)
+    ]
+    assert np.allclose(lowest, [0, 0.06, 0, 0.02], atol=0.002)
+    again = stack(models, np.random.default_rng(0))
+    assert all(
+        np.array_equal(a.position, b.position) and np.array_equal(a.orientation, b.orientation)
+        for a, b in zip(poses, again, strict=True)
+    )
+
+
+def test_the_option_makes_stacked_scenes(data):
+    assert generate(data, data / "on", "--scenes", 1, "--views", 1, "--stack").exit_code == 0
+    entries = json.loads((data / "on" / "00000000" / "objects.json").read_text())
+    assert max(entry["position"][2] for entry in entries) > 0

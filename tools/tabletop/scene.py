@@ -19,6 +19,7 @@ from tabletop.light import draw_light, relight
 from tabletop.models import Model, load_model
 from tabletop.render import FAR, NEAR, NOTHING, Camera, Picture, draw_camera, draw_look, render
 from tabletop.settle import Pose, drop
+from tabletop.stack import stack
 from tabletop.stage import Stage, stage_of
 
 FEWEST, MOST = 3, 10
@@ -32,7 +33,8 @@ JPEG_QUALITY = 95
 @dataclass(frozen=True)
 class Plan:
     """What all scenes of a set share. `noise`: a key of `LIMITS`; `light`: one of `LIGHTS`;
-    `size`: (width, height); `sensor`: one of `SENSOR_NAMES`, instead of noise."""
+    `size`: (width, height); `sensor`: one of `SENSOR_NAMES`, instead of noise; `stacked`: every
+    second object is dropped onto the one before it."""
 
     meshes: tuple[Path, ...]
     data_root: Path
@@ -44,6 +46,7 @@ class Plan:
     overwrite: bool
     light: str = "plain"
     sensor: str = "none"
+    stacked: bool = False
 
 
 def check_depth(folder: Path, data_root: Path, noise: str, sensor: str) -> list[Distance]:
@@ -61,7 +64,7 @@ def make_scene(plan: Plan, number: int, check: bool) -> list[Distance]:
 
     Errors: SceneError if the check fails or no draw leaves enough objects on the table.
     """
-    paths, models, poses = draw_objects(plan.meshes, plan.seed, number)
+    paths, models, poses = draw_objects(plan.meshes, plan.seed, number, stacked=plan.stacked)
     rng = child_rng(plan.seed, "scene", number, "views")
     look = draw_look(len(models), rng)
     centers = [pose.apply(model.center[None])[0] for pose, model in zip(poses, models, strict=True)]
@@ -104,12 +107,13 @@ def make_scene(plan: Plan, number: int, check: bool) -> list[Distance]:
 
 
 def draw_objects(
-    meshes: tuple[Path, ...], seed: int, number: int
+    meshes: tuple[Path, ...], seed: int, number: int, *, stacked: bool = False
 ) -> tuple[list[Path], list[Model], list[Pose]]:
     """Three to ten objects that lie still on the table; drawn again until there are three.
 
     A mesh comes twice only where there are fewer meshes than objects.
     """
+    place = stack if stacked else drop
     for attempt in range(MAX_DRAWS):
         rng = child_rng(seed, "scene", number, "objects", attempt)
         count = int(rng.integers(FEWEST, MOST + 1))
@@ -120,7 +124,7 @@ def draw_objects(
         models = [load_model(path) for path in paths]
         kept = [
             (path, model, pose)
-            for path, model, pose in zip(paths, models, drop(models, rng), strict=True)
+            for path, model, pose in zip(paths, models, place(models, rng), strict=True)
             if pose is not None
         ]
         if len(kept) >= FEWEST:

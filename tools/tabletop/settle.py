@@ -3,7 +3,8 @@
 Every object collides as the convex hull of its mesh. On a plane this is exact, since a rigid body
 touches a plane with its hull only; among objects it is on the safe side: they never pass through
 each other, but nothing nests in a bowl or reaches through a handle. A convex decomposition would
-let them, for half a minute of work a mesh.
+let them, for half a minute of work a mesh. In tools/tabletop/stack.py lower objects stay put,
+and collide as they are.
 """
 
 from __future__ import annotations
@@ -54,13 +55,13 @@ def drop(models: list[Model], rng: np.random.Generator) -> list[Pose | None]:
     """
     with new_world() as world:
         world.setGravity(0, 0, -9.81)
-        _add_table(world)
+        add_table(world)
         bodies: list[int] = []
         radius = drop_radius(models)
         for model in models:
             bodies.append(_drop_one(world, model, bodies, radius, rng))
-            _step(world, PAUSE)
-        if not _rest(world, bodies):
+            step(world, PAUSE)
+        if not come_to_rest(world, bodies):
             return [None] * len(models)
         poses = [_pose(world, body, model) for body, model in zip(bodies, models, strict=True)]
     lowest = [
@@ -82,14 +83,16 @@ def drop_radius(models: list[Model]) -> float:
     return float(np.clip(0.5 * np.sqrt(np.sum(diameters**2)), 0.05, 0.4 * TABLE_HALF))
 
 
-def _add_table(world: World) -> None:
+def add_table(world: World) -> None:
+    """The table that everything is dropped on."""
     half = [TABLE_HALF, TABLE_HALF, TABLE_THICKNESS / 2]
     shape = world.createCollisionShape(world.GEOM_BOX, halfExtents=half)
     table = world.createMultiBody(0, shape, basePosition=[0, 0, -TABLE_THICKNESS / 2])
-    _set_contact(world, table)
+    set_contact(world, table)
 
 
-def _set_contact(world: World, body: int) -> None:
+def set_contact(world: World, body: int) -> None:
+    """Friction, damping and collision margin of a body."""
     # Rolling friction stands in for the flat spots and soft skins that stop real fruit and cans.
     world.changeDynamics(
         body,
@@ -121,19 +124,20 @@ def _drop_one(
         basePosition=[x, y, z],
         baseOrientation=orientation.as_quat().tolist(),
     )
-    _set_contact(world, body)
+    set_contact(world, body)
     return int(body)
 
 
-def _step(world: World, seconds: float) -> None:
+def step(world: World, seconds: float) -> None:
+    """Simulate so many seconds."""
     for _ in range(round(seconds * STEPS_A_SECOND)):
         world.stepSimulation()
 
 
-def _rest(world: World, bodies: list[int]) -> bool:
+def come_to_rest(world: World, bodies: list[int]) -> bool:
     """Simulate until all that lies on the table lies still; False if it does not in time."""
     for _ in range(round(SETTLE_LIMIT / PAUSE)):
-        _step(world, PAUSE)
+        step(world, PAUSE)
         moving = False
         for body in bodies:
             (_, _, z), _ = world.getBasePositionAndOrientation(body)

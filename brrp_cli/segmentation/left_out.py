@@ -1,0 +1,109 @@
+"""Masks that are no whole object on the support surface: cut by the image's border, in the air, or
+depth that smears over the table's edge.
+
+What reaches into the image from outside is a part of something (an arm, a hand, a chair, the next
+object), and so is what rises above the table and stands on nothing: it belongs to what is beside
+or behind the table.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brrp_cli.config.segmentation import LeftOutConfig
+from brrp_cli.dependencies import import_library
+
+CUT = "cut by the image's border"
+IN_THE_AIR = "off the support surface"
+EDGE = "smeared over the table's edge"
+
+
+def left_out(
+    segmap: NDArray[np.int64],
+    depth: NDArray[np.floating],
+    height: NDArray[np.floating],
+    config: LeftOutConfig,
+) -> dict[int, str]:
+    """Why a mask is no whole object on the table, `CUT`, `IN_THE_AIR` or `EDGE`, by id.
+
+    segmap : (H, W), 0 = background; depth, height : (H, W) metres along z and above the support
+    plane, NaN = no return
+    """
+    ndimage = import_library("scipy.ndimage")
+    reasons = {}
+    for object_id, box in enumerate(ndimage.find_objects(segmap), start=1):
+        if box is None:
+            continue
+        if border_share(segmap == object_id) > config.cut:
+            reasons[object_id] = CUT
+            continue
+        reach = config.reach
+        window = tuple(
+            slice(max(cut.start - reach, 0), min(cut.stop + reach, size))
+            for cut, size in zip(box, segmap.shape, strict=True)
+        )
+        mask = segmap[window] == object_id
+        if not (mask & np.isfinite(height[window])).any():
+            continue
+        if _at_the_edge(mask, depth[window], height[window], config):
+            reasons[object_id] = EDGE
+        elif not _stands(mask, segmap[window], depth[window], height[window], config):
+            reasons[object_id] = IN_THE_AIR
+    return reasons
+
+
+def border_share(mask: NDArray[np.bool_]) -> float:
+    """The part of a mask's outline that lies on the image's border; 0 of an empty one."""
+    ndimage = import_library("scipy.ndimage")
+    frame = np.ones(mask.shape, dtype=bool)
+    frame[1:-1, 1:-1] = False
+    outline = mask & ~ndimage.binary_erosion(mask)
+    return float((outline & frame).sum() / max(int(outline.sum()), 1))
+
+
+def told(reasons: Mapping[int, str]) -> str:
+    """How many masks were left out and why, in words."""
+    kinds = [(reason, list(reasons.values()).count(reason)) for reason in (CUT, IN_THE_AIR, EDGE)]
+    return ", ".join(f"{count} {reason}" for reason, count in kinds if count)
+
+
+def _at_the_edge(
+    mask: NDArray[np.bool_],
+    depth: NDArray[np.floating],
+    height: NDArray[np.floating],
+    config: LeftOutConfig,
+) -> bool:
+    """Whether what is low has, around much of it, no table but what is far behind it."""
+    ndimage = import_library("scipy.ndimage")
+    if np.nanpercentile(height[mask], 100 - config.lowest) >= config.edge_height:
+        return False
+    around = ndimage.binary_dilation(mask, iterations=config.reach) & ~mask
+    farther = ~(depth[around] <= np.nanmedian(depth[mask]) + config.edge)
+    return bool(farther.sum() > config.edge_share * max(int(around.sum()), 1))
+
+
+def _stands(
+    mask: NDArray[np.bool_],
+    segmap: NDArray[np.int64],
+    depth: NDArray[np.floating],
+    height: NDArray[np.floating],
+    config: LeftOutConfig,
+) -> bool:
+    """Whether a mask reaches down to the table, or something hides its foot or bears it."""
+    ndimage = import_library("scipy.ndimage")
+    known = mask & np.isfinite(height)
+    if np.percentile(height[known], config.lowest) < config.stands:
+        return True
+    # At the lower end of the outline: what is next to it, in the image?
+    outline = known & ~ndimage.binary_erosion(mask)
+    if not outline.any():
+        return True
+    foot = outline & (height <= np.percentile(height[outline], config.foot))
+    own = float(np.median(depth[foot]))
+    beside = ndimage.binary_dilation(foot, iterations=config.reach) & ~mask & np.isfinite(depth)
+    nearer = depth[beside] < own - config.touch
+    bears = (segmap[beside] != 0) & (np.abs(depth[beside] - own) <= config.touch)
+    return bool((nearer | bears).sum() > config.held * max(int(beside.sum()), 1))
