@@ -69,7 +69,8 @@ GRIPPER_HELP = f"{', '.join(gripper_names())}, or a YAML file."
     type=click.Choice([JSON, *LAYOUTS]),
     default=JSON,
     show_default=True,
-    help=f"Beside {RECORD}: an array as GraspNet's API or contact_graspnet has it.",
+    help=f"Beside {RECORD}, and a GLB of the best hands, an array as GraspNet's API or "
+    "contact_graspnet has it.",
 )
 @click.option("--seed", type=SEED, default=0, show_default=True)
 @json_option
@@ -124,10 +125,11 @@ def command(
 
 
 def files_of(record: Path, layout: str) -> list[Path]:
-    """The record and, beside it, the array in a layout."""
+    """The record and, beside it, the hands as a scene and the array in a layout."""
+    paths = [record, record.with_suffix(".glb")]
     if layout == JSON:
-        return [record]
-    return [record, record.with_suffix(Path(LAYOUTS[layout][0]).suffix)]
+        return paths
+    return [*paths, record.with_suffix(Path(LAYOUTS[layout][0]).suffix)]
 
 
 def grasp(
@@ -136,6 +138,7 @@ def grasp(
     """Plan, write, and tell it with a line for each object. Errors: those of `plan_grasps`,
     OutputError."""
     from brrp_cli.files import atomic_path
+    from brrp_cli.grasping.drawing import save_glb
     from brrp_cli.grasping.plan import plan_grasps
     from brrp_cli.grasping.record import write_grasps
 
@@ -143,17 +146,23 @@ def grasp(
     frame = stored.record["frame"]
     paths = files_of(record, layout)
     write_grasps(plan, paths[0], frame, stored.T_frame_cam)
-    if layout != JSON:
+    if plan.grasps:
         with atomic_path(paths[1]) as partial:
+            save_glb(plan, partial, frame, stored.T_frame_cam)
+    else:
+        paths[1].unlink(missing_ok=True)
+    if layout != JSON:
+        with atomic_path(paths[2]) as partial:
             LAYOUTS[layout][1](plan, partial)
     for each in plan.objects:
         click.echo(f"  {told(each)}")
     held = sum(bool(each.grasps) for each in plan.objects)
     if layout != JSON and frame != "camera":
-        note(f"  {paths[1].name} is in the camera frame, as its readers expect")
+        note(f"  {paths[2].name} is in the camera frame, as its readers expect")
+    written = ", ".join(str(path) for path in paths if path.exists())
     click.echo(
         f"Wrote {len(plan.grasps)} grasps of {held} of {len(plan.objects)} objects with the "
-        f"{gripper.name}, metres, {frame} frame: {', '.join(str(path) for path in paths)}"
+        f"{gripper.name}, metres, {frame} frame: {written}"
     )
     return plan
 

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import trimesh
 from click.testing import CliRunner
 from made_result import BOX, ELL, SPECK, truth, write_made_result
 from table_scene import T_WORLD_CAM, TABLE
@@ -122,6 +123,19 @@ def test_contact_graspnet_reads_its_layout(results, tmp_path):
         np.testing.assert_allclose(openings[object_id], [g["opening"] for g in mine], atol=1e-6)
         left = transform_points(T_WORLD_CAM, points[object_id])
         np.testing.assert_allclose(left, [g["contacts"][0] for g in mine], atol=1e-6)
+
+
+def test_the_best_hands_are_a_scene_in_the_frame_of_the_results(results, planned):
+    scene = trimesh.load_scene(results / "grasps.glb")
+    assert set(scene.geometry) == {f"grasps_{BOX}", f"grasps_{ELL}"}
+    hands = scene.geometry[f"grasps_{BOX}"]
+    tips = [np.array(g["T_world_gripper"])[:3, 3] for g in of(planned[0], BOX)["grasps"][:5]]
+    low, high = np.min(tips, axis=0), np.max(tips, axis=0)
+    grown = hands.bounds + np.array([[-0.1], [0.1]])
+    assert (grown[0] <= low).all() and (high <= grown[1]).all()
+    # A score near 1 is green.
+    colour = np.asarray(hands.visual.vertex_colors)[0]
+    assert colour[1] > colour[0] and colour[1] > colour[2]
 
 
 def test_python_plans_what_the_command_does(results, planned):
