@@ -22,7 +22,7 @@ HIT_TABLE, HIT_NEIGHBOUR, HIT_OBJECT = "hit the table", "hit a neighbour", "hit 
 MISSED, SLIPPED, DROPPED = "closed on nothing", "slipped", "dropped"
 OUTCOMES = (HELD, HIT_OBJECT, HIT_NEIGHBOUR, HIT_TABLE, MISSED, SLIPPED, DROPPED)
 
-SETTLE, APPROACH, CLOSE, LIFT, SHAKE = 0.3, 0.5, 0.7, 1.0, 1.2  # seconds
+SETTLE, APPROACH, CLOSE, LIFT, SHAKE = 0.2, 0.4, 0.5, 0.6, 0.8  # seconds
 HEIGHT = 0.2  # metres
 # An object that the open hand moves by more than this was hit, metres.
 MOVED = 0.004

@@ -15,7 +15,11 @@ from brrp_cli.planning.numbers import quaternion_wxyz, spell
 from brrp_cli.planning.options import DENSITY
 from grasp_trial.bodies import TrueBody
 
-STEP = 0.002  # seconds
+STEP = 0.001  # seconds
+# Contacts yield by force / mass x this time squared: what weighs little is crushed otherwise.
+CONTACT_TIME = 0.002  # seconds
+LIGHTEST = 0.1  # kg
+FORCE = 40.0  # newtons, at most: nobody closes on a ball with all that a hand has
 HAND_MASS, FINGER_MASS = 1.0, 0.05  # kg
 FINGER_DAMPING = 20.0  # N s / m
 STIFFNESS = 3000.0  # N / m of what drives a finger, up to the hand's force
@@ -39,7 +43,11 @@ def world_xml(bodies: Sequence[TrueBody], gripper: Gripper, friction: float) -> 
     )
     default = ET.SubElement(model, "default")
     ET.SubElement(
-        default, "geom", friction=spell([friction, TORSION, ROLLING]), condim="6", margin="0"
+        default,
+        "geom",
+        friction=spell([friction, TORSION, ROLLING]),
+        condim="6",
+        solref=spell([CONTACT_TIME, 1]),
     )
     assets = ET.SubElement(model, "asset")
     world = ET.SubElement(model, "worldbody")
@@ -59,6 +67,8 @@ def _add_object(assets: ET.Element, world: ET.Element, body: TrueBody, number: i
     element = ET.SubElement(world, "body", {"name": name, **place})
     ET.SubElement(element, "freejoint", name=name)
     mass, inertia = mass_and_inertia(body.mesh, DENSITY)
+    heavier = max(1.0, LIGHTEST / mass)
+    mass, inertia = mass * heavier, inertia * heavier
     (xx, xy, xz), (_, yy, yz), (_, _, zz) = inertia
     ET.SubElement(
         element,
@@ -79,7 +89,7 @@ def _add_hand(model: ET.Element, world: ET.Element, hand: Gripper) -> None:
     base = ET.SubElement(world, "body", name="hand", pos="0 0 2", gravcomp="1")
     ET.SubElement(base, "freejoint", name="hand")
     half = np.array([hand.palm_width, hand.palm_depth, hand.palm_length]) / 2
-    mass = str(HAND_MASS)
+    mass, force = str(HAND_MASS), min(hand.force, FORCE)
     grey = "0.55 0.57 0.6 1"
     ET.SubElement(
         base,
@@ -116,7 +126,7 @@ def _add_hand(model: ET.Element, world: ET.Element, hand: Gripper) -> None:
             name=name,
             joint=name,
             kp=str(STIFFNESS),
-            forcerange=spell([-hand.force, hand.force]),
+            forcerange=spell([-force, force]),
             forcelimited="true",
         )
     equality = ET.SubElement(model, "equality")
