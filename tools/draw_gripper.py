@@ -1,6 +1,6 @@
 """Draw a gripper's boxes and the conventions of its frame, for docs/grasping.md.
 
-    python tools/draw_gripper.py --gripper franka-hand -o docs/images/gripper_frame.png
+python tools/draw_gripper.py --gripper franka-hand -o docs/images/gripper_frame.png
 """
 
 from __future__ import annotations
