@@ -19,6 +19,8 @@ if TYPE_CHECKING:
     from brrp_cli.frames.build import make_frame as make_frame
     from brrp_cli.frames.npz import load_frame as load_frame
     from brrp_cli.frames.readers import read_frame as read_frame
+    from brrp_cli.grasping.gripper_file import open_gripper as open_gripper
+    from brrp_cli.grasping.plan import plan_grasps as plan_grasps
     from brrp_cli.methods.config_file import load_config as load_config
     from brrp_cli.methods.posterior_file import open_posterior as open_posterior
     from brrp_cli.prior.store import open_prior as open_prior
@@ -35,9 +37,11 @@ _HOMES = {
     "load_config": "brrp_cli.methods.config_file",
     "load_frame": "brrp_cli.frames.npz",
     "make_frame": "brrp_cli.frames.build",
+    "open_gripper": "brrp_cli.grasping.gripper_file",
     "open_posterior": "brrp_cli.methods.posterior_file",
     "open_prior": "brrp_cli.prior.store",
     "open_result": "brrp_cli.api",
+    "plan_grasps": "brrp_cli.grasping.plan",
     "preset": "brrp_cli.config",
     "read_frame": "brrp_cli.frames.readers",
     "reconstruct": "brrp_cli.api",

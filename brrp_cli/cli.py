@@ -26,6 +26,7 @@ COMMANDS = {
     "reconstruct": ("reconstruct", "Turn an RGBD frame into a closed mesh per object."),
     "view": ("view", "Look at results in one HTML page, offline."),
     "export": ("export", "Turn results into collision shapes: URDF, MJCF, a cuRobo world."),
+    "grasp": ("grasp", "Plan grasps of every object, ranked by how probably they hold."),
     "config": ("config", "Show every number that decides a result."),
     "fetch": ("fetch", "Bring CLIP, models that make masks, or meshes."),
     "eval": ("eval", "Measure methods on scenes whose truth is known."),

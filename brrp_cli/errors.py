@@ -114,6 +114,10 @@ class FetchError(BrrpError):
     """A file cannot be fetched, or what came is not the file that was meant."""
 
 
+class GripperError(BrrpError):
+    """A gripper is not known, or its file cannot be used."""
+
+
 class ResultError(BrrpError):
     """A folder of results cannot be used."""
 

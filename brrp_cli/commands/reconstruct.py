@@ -13,6 +13,7 @@ import click
 
 from brrp_cli.commands.export import CONFIDENCE, export
 from brrp_cli.commands.frame import refuse_existing
+from brrp_cli.commands.grasp import GRIPPER_HELP, JSON, grasp
 from brrp_cli.commands.json_option import json_option, report_of
 from brrp_cli.commands.many_frames import Work, check_many, frame_slice, run_many
 from brrp_cli.commands.method_options import (
@@ -29,6 +30,9 @@ from brrp_cli.commands.seed_option import SEED, SEED_HELP, device_option
 from brrp_cli.commands.source_options import SourceOptions, source_options
 from brrp_cli.commands.view import PAGE, title, view
 from brrp_cli.files import atomic_path
+from brrp_cli.grasping.gripper_file import DEFAULT as DEFAULT_HAND
+from brrp_cli.grasping.gripper_file import open_gripper
+from brrp_cli.grasping.record import RECORD
 from brrp_cli.methods.registry import DEFAULT, METHODS, preset_names, reconstructing
 from brrp_cli.planning.options import PlanOptions
 from brrp_cli.planning.parts import HOW, check_available
@@ -39,6 +43,7 @@ from brrp_cli.retrieval.clip.model_files import CLIP_DIR_VARIABLE
 if TYPE_CHECKING:
     from brrp_cli.config.segmentation import SegmentConfig
     from brrp_cli.frames.frame import Frame
+    from brrp_cli.grasping.gripper import Gripper
     from brrp_cli.methods.base import Method
     from brrp_cli.prior.store import Prior
     from brrp_cli.retrieval.base import Retriever
@@ -120,6 +125,14 @@ NO_COLLISION = "none"
     help="With --collision: shapes inside which each object lies with this probability.",
 )
 @click.option(
+    "--grasp", "grasp_it", is_flag=True, help=f"Also what `brrp grasp` writes, OUT/{RECORD}."
+)
+@click.option(
+    "--gripper",
+    metavar="NAME|FILE.yaml",
+    help=f"Of --grasp: {GRIPPER_HELP} [default: {DEFAULT_HAND}]",
+)
+@click.option(
     "--poses",
     type=click.Choice(["bop"]),
     help=f"Also the 6D poses of recognised objects: OUT/{POSES}, a BOP results file.",
@@ -146,6 +159,8 @@ def command(
     workers: int | None,
     collision: str,
     confidence: float | None,
+    grasp_it: bool,
+    gripper: str | None,
     poses: str | None,
     html: bool,
     open_it: bool,
@@ -170,6 +185,7 @@ def command(
       brrp reconstruct frame.npz --method vprism
       brrp reconstruct frame.npz --method pointsdf --weights prior.safetensors
       brrp reconstruct frame.npz --collision coacd --confidence 0.95
+      brrp reconstruct frame.npz --grasp --gripper robotiq-2f-85
       brrp reconstruct frame.npz --prior prior/ --poses bop
       brrp reconstruct recording.bag --frames 0:300:30 --prior prior/ -o out/
     """
@@ -185,6 +201,7 @@ def command(
     from brrp_cli.results.write import check_output, write_results
 
     check_collision(collision, confidence)
+    hand = check_gripper(grasp_it, gripper)
     chosen = METHODS[method]
     check_options(chosen, preset_name, device)
     read = None if file is None else read_config(file)
@@ -251,6 +268,8 @@ def command(
         if done and collision != NO_COLLISION:
             options = PlanOptions(collision, confidence, seed=seed)
             export(open_result(output), None, options, overwrite=False)
+        if done and hand is not None:
+            grasp(open_result(output), hand, output / RECORD, JSON, seed=seed)
         if html or open_it:
             view(open_result(output), title(output), output / PAGE, open_it=open_it)
         return table
@@ -327,6 +346,14 @@ def check_collision(collision: str, confidence: float | None) -> None:
     if collision == NO_COLLISION and confidence is not None:
         raise click.UsageError(f"--confidence is of collision shapes: add --collision {HOW[0]}")
     check_available(collision)
+
+
+def check_gripper(grasp_it: bool, gripper: str | None) -> Gripper | None:
+    """The gripper of --grasp; UsageError for --gripper alone, GripperError for one that is not
+    known."""
+    if gripper is not None and not grasp_it:
+        raise click.UsageError("--gripper is of grasps: add --grasp")
+    return open_gripper(gripper or DEFAULT_HAND) if grasp_it else None
 
 
 def open_prior_of(

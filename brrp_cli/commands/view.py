@@ -40,7 +40,8 @@ def command(
 
     The page holds all that it needs, so that it can be kept, sent and opened without a network:
     the image, the observed points, every object to turn on and off, uncertainty as colour, what
-    was retrieved and how sure that is, and the collision shapes where `brrp export` wrote some.
+    was retrieved and how sure that is, the collision shapes where `brrp export` wrote some, and the
+    best grasps where `brrp grasp` did.
     OUT/view.html is made anew each time; a file that -o names is replaced only with --overwrite.
 
     \b

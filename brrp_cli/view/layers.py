@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from brrp_cli.frames.frame import BACKGROUND, Frame
 from brrp_cli.geometry import transform_points
+from brrp_cli.grasping.drawing import stored_hands
 from brrp_cli.reconstruction import Surface
 from brrp_cli.results.read import StoredResult
 from brrp_cli.surface.colours import spread
@@ -50,7 +51,8 @@ def point_stride(frame: Frame) -> int:
 
 def page_glb(stored: StoredResult) -> bytes:
     """One GLB: `object_ID` with its colours and `_spread` on its vertices,
-    `points_ID`, and `plan_object_ID_part_I` where there are collision shapes."""
+    `points_ID`, `plan_object_ID_part_I` where there are collision shapes, and `grasps_ID` where
+    `brrp grasp` found some."""
     import trimesh
 
     scene = trimesh.Scene()
@@ -62,6 +64,8 @@ def page_glb(stored: StoredResult) -> bytes:
             _add(scene, f"points_{object_id}", trimesh.PointCloud(points, colours))
     for name, part in collision_parts(stored).items():
         _add(scene, f"plan_{name}", part)
+    for object_id, hands in stored_hands(stored.folder).items():
+        _add(scene, f"grasps_{object_id}", hands)
     if not scene.geometry:
         return b""
     return bytes(scene.export(file_type="glb"))

@@ -34,6 +34,7 @@ def results(tmp_path_factory) -> Path:
     folder = write_made_result(tmp_path_factory.mktemp("made") / "out")
     code = CliRunner().invoke(main, ["export", str(folder), "--collision", "hull"]).exit_code
     assert code == 0
+    assert CliRunner().invoke(main, ["grasp", str(folder), "--per-object", "2"]).exit_code == 0
     return folder
 
 
@@ -63,13 +64,16 @@ def test_names_of_objects_end_no_script(page):
     assert "<b>" not in page.read_text()
 
 
-def test_the_glb_holds_meshes_points_spread_and_collision_shapes(page, results):
+def test_the_glb_holds_meshes_points_spread_collision_shapes_and_grasps(page, results):
     blob = base64.b64decode(embedded(page, "glb"))
     scene = trimesh.load_scene(trimesh.util.wrap_as_stream(blob), file_type="glb")
     expected = {f"{kind}_{i}" for i in (BOX, ELL) for kind in ("object", "points")}
     assert expected | {"points_0"} <= set(scene.geometry)
     assert {name for name in scene.geometry if name.startswith("plan_")} == {
         f"plan_object_{i}_part_0" for i in (BOX, ELL)
+    }
+    assert {name for name in scene.geometry if name.startswith("grasps_")} == {
+        f"grasps_{i}" for i in (BOX, ELL)
     }
     mesh = trimesh.load_mesh(results / f"object_{BOX}.ply", process=False)
     stored = mesh.metadata["_ply_raw"]["vertex"]["data"]["uncertainty"].reshape(-1)
@@ -134,6 +138,10 @@ def test_a_browser_draws_it_turns_objects_off_and_asks_for_nothing(page):
         assert (behind != by_object).any(axis=2).mean() > 0.05
         tab.click("#show-plan")
         assert (tab.screenshot() != behind).any(axis=2).mean() > 0.01
+        shapes = tab.screenshot()
+        tab.click("#show-grasps")
+        green = tab.screenshot().astype(int)
+        assert (green != shapes).any(axis=2).mean() > 0.002
         tab.click("#show-table")
         tab.click("#none")
         empty = tab.screenshot()[60:640, 410:]

@@ -5,11 +5,11 @@
   const told = JSON.parse(document.getElementById("told").textContent);
   const find = (id) => document.getElementById(id);
   const NONE = "none of them";
-  const objects = new Map(); // id -> {mesh, points, parts, on, card, told}
+  const objects = new Map(); // id -> {mesh, points, parts, hands, on, card, told}
   let surroundings = null;
   let draw = () => {};
 
-  for (const each of told.objects) objects.set(each.id, { told: each, on: true, parts: [] });
+  for (const each of told.objects) objects.set(each.id, { told: each, on: true, parts: [], hands: null });
 
   // ---- numbers for people -------------------------------------------------------------------
   const two = (value) => (value === null || value === undefined ? "–" : value.toFixed(2));
@@ -140,6 +140,7 @@
         paint(entry, colour);
       }
       if (entry.points) entry.points.visible = entry.on && find("show-points").checked;
+      if (entry.hands) entry.hands.visible = entry.on && find("show-grasps").checked;
       for (const part of entry.parts) part.visible = entry.on && find("show-plan").checked;
     }
     if (surroundings) surroundings.visible = find("show-table").checked;
@@ -185,7 +186,7 @@
   }
 
   function take(node) {
-    const [, plan, kind, number] = /^(plan_)?(object|points)_(-?\d+)/.exec(node.name) || [];
+    const [, plan, kind, number] = /^(plan_)?(object|points|grasps)_(-?\d+)/.exec(node.name) || [];
     if (!kind) return;
     const geometry = node.geometry;
     const entry = objects.get(Number(number));
@@ -198,6 +199,13 @@
       return;
     }
     if (!entry) return;
+    if (kind === "grasps") {
+      geometry.computeVertexNormals();
+      node.material = new THREE.MeshLambertMaterial({ vertexColors: true, flatShading: true });
+      find("grasps-label").hidden = false;
+      entry.hands = node;
+      return;
+    }
     geometry.computeVertexNormals();
     node.material = new THREE.MeshLambertMaterial({
       vertexColors: true, side: THREE.DoubleSide,
@@ -291,7 +299,7 @@
       pick(id);
     });
 
-    for (const id of ["show-meshes", "show-points", "show-table", "show-plan", "top"]) {
+    for (const id of ["show-meshes", "show-points", "show-table", "show-plan", "show-grasps", "top"]) {
       find(id).addEventListener("input", refresh);
     }
     document.querySelectorAll("input[name=colour]").forEach((each) => each.addEventListener("change", refresh));

@@ -1,0 +1,77 @@
+"""Candidates for grasps, and what they are scored by. Lengths are metres, angles degrees."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from brrp_cli.config.ranges import between, share
+
+
+@dataclass(frozen=True)
+class GraspConfig:
+    """Grasps of a parallel-jaw hand.
+
+    Candidates
+    points : on each surface from which the opposite one is looked for; about a share
+    `sampled_share` of them on `sampled` surfaces of the posterior, the rest on the mesh
+    thinnest : pairs that are closer are none
+    pairs : of antipodal points that are kept of an object; angles : approaches around the axis of
+    each pair; reaches : how far the fingertips reach beyond the pair, one after the other
+    steepest : an approach that goes up from the table by more than this angle is left out;
+    top_down, cone : largest angle between an approach and straight down where one of these is asked
+    for
+    candidates : poses of an object that are scored at most
+
+    The hand
+    clearance : the hand comes in open so much further than the pair is apart, on each side, where
+    its opening allows it
+    approach : straight way in, from the pre-grasp
+    table_gap : least height over the table; inset : by which the boxes of the hand are smaller
+    where they are held against the object and its neighbours, which were measured with noise
+
+    Score
+    draws : of the object's surface from its posterior, and of where the hand gets to; as many as
+    `surfaces` of them are level sets, which are taken in turn
+    accuracy : standard deviation of the hand's place along each axis; accuracy_angle : of its
+    orientation about each axis
+    nodes : of the grid of a drawn surface, whose spacing lies between `finest` and `coarsest`
+    pad_rows, pad_columns : rays from each finger along and across it, which find what it meets
+    yields : what lies so far behind the first contact of a finger still touches it
+    confidence : collision shapes of neighbours hold them with this probability; 0: their meshes
+    friction : Coulomb's coefficient between fingers and object
+    lever : distance of the closing axis from the object's centre over which a grasp's quality,
+    which ranks those with the same score, falls to a third
+    apart, apart_angle : of two grasps with the same object one is left out that is nearer
+    """
+
+    points: int = 400
+    sampled_share: float = share(0.5)
+    sampled: int = 4
+    pairs: int = 64
+    angles: int = 12
+    reaches: tuple[float, ...] = (0.03, 0.015)
+    least_reach: float = 0.003
+    steepest: float = between(10.0, 0.0, 90.0)
+    top_down: float = between(15.0, 0.0, 90.0)
+    cone: float = between(45.0, 0.0, 90.0)
+    thinnest: float = 0.001
+    candidates: int = 250
+    clearance: float = 0.015
+    approach: float = 0.1
+    table_gap: float = 0.002
+    inset: float = 0.0005
+    draws: int = 24
+    surfaces: int = 12
+    accuracy: float = 0.001
+    accuracy_angle: float = between(0.5, 0.0, 90.0)
+    nodes: int = 25_000
+    finest: float = 0.002
+    coarsest: float = 0.006
+    pad_rows: int = 5
+    pad_columns: int = 3
+    yields: float = 0.0015
+    confidence: float = share(0.9)
+    friction: float = 0.5
+    lever: float = 0.05
+    apart: float = 0.01
+    apart_angle: float = between(20.0, 0.0, 180.0)

@@ -1,0 +1,1 @@
+"""Parallel-jaw grasps of reconstructed objects, and how probably they hold."""

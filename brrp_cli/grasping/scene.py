@@ -1,0 +1,110 @@
+"""What a planner of grasps knows of a scene: objects, their posteriors, the table."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brrp_cli.config import SurfaceConfig
+from brrp_cli.config.tables import changed
+from brrp_cli.errors import ResultError
+from brrp_cli.geometry import transform_points
+from brrp_cli.observation.support_plane import Plane
+from brrp_cli.reconstruction import OccupancyPosterior, Reconstruction
+from brrp_cli.results.read import StoredResult
+
+Array = NDArray[np.float64]
+# Up in the image, where no table says it.
+IMAGE_UP = np.array([0.0, -1.0, 0.0])
+
+
+@dataclass(frozen=True)
+class GraspObject:
+    """vertices (n, 3) and faces (m, 3) of its closed, outward mesh, metres, camera frame; observed
+    (k, 3), its points, the same. posterior : None where its mesh is all that is known."""
+
+    object_id: int
+    vertices: Array
+    faces: NDArray[np.int64]
+    observed: NDArray[np.floating]
+    posterior: OccupancyPosterior | None
+
+
+@dataclass(frozen=True)
+class GraspScene:
+    """objects : those that have a mesh; plane : the table, camera frame; without : why others have
+    none, by id; loose : (n, 3) observed points of those; surface : how meshes were made"""
+
+    objects: list[GraspObject]
+    plane: Plane | None
+    without: dict[int, str]
+    loose: Array
+    surface: SurfaceConfig
+
+    @property
+    def up(self) -> Array:
+        """(3,) the table's normal; without a table, up in the image."""
+        return IMAGE_UP if self.plane is None else np.asarray(self.plane.normal, dtype=np.float64)
+
+
+def scene_of(result: Reconstruction | StoredResult) -> GraspScene:
+    """The scene of a reconstruction, or of a folder of results.
+
+    Errors: ResultError where no object has a mesh; those of reading the folder.
+    """
+    scene = _stored(result) if isinstance(result, StoredResult) else _computed(result)
+    if not scene.objects:
+        raise ResultError(
+            "No object of the results has a mesh, so that there is nothing to grasp",
+            where=result.folder if isinstance(result, StoredResult) else None,
+            expected="one object with a mesh at least",
+            found=", ".join(f"object {i}: {why}" for i, why in scene.without.items()) or "none",
+            fix="look at the masks with `brrp view`, correct them, and reconstruct again",
+        )
+    return scene
+
+
+def _stored(stored: StoredResult) -> GraspScene:
+    T_cam_frame = np.linalg.inv(stored.T_frame_cam)
+    objects = [
+        GraspObject(
+            object_id,
+            np.asarray(transform_points(T_cam_frame, surface.vertices), dtype=np.float64),
+            surface.faces,
+            stored.frame.object_points(object_id),
+            stored.posteriors[object_id],
+        )
+        for object_id, surface in stored.surfaces.items()
+    ]
+    without = {
+        item["id"]: item["message"] or item["status"]
+        for item in stored.record["objects"]
+        if item["mesh"] is None
+    }
+    loose = [stored.frame.object_points(i) for i in without]
+    return GraspScene(objects, stored.plane_cam, without, _joined(loose), stored.surface_config)
+
+
+def _computed(result: Reconstruction) -> GraspScene:
+    objects = [
+        GraspObject(
+            each.object_id,
+            each.surface.vertices,
+            each.surface.faces,
+            result.frame.object_points(each.object_id),
+            each.posterior,
+        )
+        for each in result.objects
+        if each.surface is not None
+    ]
+    without = {o.object_id: o.message or o.status for o in result.objects if o.surface is None}
+    loose = [result.frame.object_points(i) for i in without]
+    table = result.configuration.get("surface", {})
+    surface = changed(SurfaceConfig(), table, "the reconstruction", "surface.")
+    return GraspScene(objects, result.plane, without, _joined(loose), surface)
+
+
+def _joined(clouds: list[NDArray[np.float32]]) -> Array:
+    return np.concatenate([np.zeros((0, 3)), *clouds]).astype(np.float64)

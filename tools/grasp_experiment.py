@@ -1,0 +1,196 @@
+"""Carry out planned grasps in MuJoCo on the true objects of made scenes, and count what holds.
+
+    python tools/make_scenes.py --meshes ycb --seed 52000 --noise structured-light -o SCENES
+    python tools/grasp_experiment.py prior=SCENES --prior prior/ --data-root data/ -o grasps.jsonl
+    python tools/grasp_experiment.py --report grasps.jsonl
+
+For each object: the best grasp of each method, and of `default` another one, drawn at random among
+those that it plans, so that low scores are tried as well. A floating hand of boxes with limited
+force comes in from the pre-grasp, closes, lifts by 20 cm and shakes, open loop. A grasp holds if
+the object is still in the hand at the end. Rows that are there are not made again.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+import time
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import click
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+from grasp_trial.bodies import true_body
+from grasp_trial.methods import DEFAULT, METHODS, scenes_of
+from grasp_trial.report import report
+from grasp_trial.trial import Trials
+
+from brrp_cli.config.grasping import GraspConfig
+from brrp_cli.errors import BrrpError
+from brrp_cli.grasping.grasp import Grasp
+from brrp_cli.grasping.gripper import Gripper
+from brrp_cli.grasping.gripper_file import DEFAULT as HAND
+from brrp_cli.grasping.gripper_file import open_gripper
+from brrp_cli.grasping.plan import plan_grasps
+from brrp_cli.ground_truth.scenes import Scene, find_scenes
+from brrp_cli.ground_truth.true_meshes import truth_cache
+from brrp_cli.seeds import child_rng
+
+# Fewer pixels of an object are no view of it.
+MIN_PIXELS = 200
+PER_OBJECT = 40
+DRIFT = 0.005  # metres
+
+
+@click.command()
+@click.argument("sets", nargs=-1, metavar="NAME=SCENES...")
+@click.option("--prior", "prior_path", type=click.Path(path_type=Path))
+@click.option("--data-root", type=click.Path(path_type=Path), help="Mesh paths are relative to it.")
+@click.option("--methods", default=",".join(METHODS), show_default=True)
+@click.option("--gripper", default=HAND, show_default=True)
+@click.option("--friction", default=GraspConfig.friction, show_default=True, help="Of both.")
+@click.option("--first", type=click.IntRange(1), help="Scenes of each set.")
+@click.option("--seed", default=0, show_default=True)
+@click.option("--cache", type=click.Path(path_type=Path), help="Of true meshes and their parts.")
+@click.option("--report", "report_of", type=click.Path(path_type=Path), help="Only tell a file.")
+@click.option("-o", "--output", type=click.Path(path_type=Path))
+def main(
+    sets: tuple[str, ...],
+    prior_path: Path | None,
+    data_root: Path | None,
+    methods: str,
+    gripper: str,
+    friction: float,
+    first: int | None,
+    seed: int,
+    cache: Path | None,
+    report_of: Path | None,
+    output: Path | None,
+) -> None:
+    """Plan grasps in each scene of SETS by each method, carry them out, write a row for each."""
+    if report_of is not None:
+        click.echo(report(_rows(report_of), DRIFT))
+        return
+    chosen = tuple(name.strip() for name in methods.split(","))
+    if output is None or not sets or set(chosen) - set(METHODS):
+        raise click.UsageError(f"name sets, -o FILE, and --methods of {', '.join(METHODS)}")
+    try:
+        prior, retriever = _open(prior_path, seed)
+        hand = open_gripper(gripper)
+        done = {(row["set"], row["scene"]) for row in _rows(output)}
+        for text in sets:
+            name, _, folder = text.partition("=")
+            for scene in find_scenes(Path(folder), slice(0, first)):
+                label = f"{name}/{scene.name}"
+                if (name, label) in done:
+                    continue
+                start = time.perf_counter()
+                rows = list(
+                    _scene_rows(
+                        scene,
+                        name,
+                        chosen,
+                        hand,
+                        friction,
+                        seed,
+                        data_root,
+                        cache or truth_cache(),
+                        prior,
+                        retriever,
+                    )
+                )
+                with output.open("a") as stream:
+                    stream.writelines(json.dumps(row) + "\n" for row in rows)
+                held = sum(row["result"] == "held" for row in rows)
+                seconds = time.perf_counter() - start
+                click.echo(f"{label}: {len(rows)} rows, {held} held, {seconds:.0f} s", err=True)
+    except BrrpError as error:
+        raise click.ClickException(str(error)) from error
+    click.echo(report(_rows(output), DRIFT))
+
+
+def _rows(path: Path) -> list[dict[str, Any]]:
+    return [json.loads(line) for line in path.read_text().splitlines()] if path.exists() else []
+
+
+def _open(path: Path | None, seed: int) -> tuple[Any, Any]:
+    if path is None:
+        return None, None
+    from brrp_cli.config import preset
+    from brrp_cli.prior.store import open_prior
+    from brrp_cli.retrieval.choose import choose_retriever
+
+    prior = open_prior(path)
+    return prior, choose_retriever("appearance", prior, preset("default"), seed)
+
+
+def _scene_rows(
+    scene: Scene,
+    name: str,
+    methods: tuple[str, ...],
+    hand: Gripper,
+    friction: float,
+    seed: int,
+    data_root: Path | None,
+    cache: Path,
+    prior: Any,
+    retriever: Any,
+) -> Iterator[dict[str, Any]]:
+    """A row for each grasp that is carried out, and for each object without one."""
+    frame = scene.view(0)
+    assert frame.T_world_cam is not None
+    bodies = [true_body(item, data_root, cache) for item in scene.objects]
+    trials = Trials(bodies, hand, friction)
+    told = scenes_of(methods, frame, bodies, prior, retriever, seed)
+    config = replace(GraspConfig(), friction=friction)
+    seen = [i for i in frame.object_ids if int((frame.segmap == i).sum()) >= MIN_PIXELS]
+    for method, view in told.items():
+        start = time.process_time()
+        plan = plan_grasps(
+            view, hand, config=config, per_object=PER_OBJECT, min_score=0.0, seed=seed, workers=1
+        )
+        seconds = time.process_time() - start
+        of = {each.object_id: each for each in plan.objects}
+        for object_id in seen:
+            grasps = of[object_id].grasps if object_id in of else []
+            row = {
+                "set": name,
+                "scene": f"{name}/{scene.name}",
+                "object": object_id,
+                "method": method,
+                "rank": "best",
+                "plan_cpu_seconds": seconds,
+            }
+            if not grasps:
+                why = of[object_id].why if object_id in of else "it has no mesh"
+                yield row | {"result": "none", "why": why, "score": None, "drift": None}
+                continue
+            yield row | _carried_out(trials, grasps[0], frame.T_world_cam, config)
+            if method == DEFAULT and len(grasps) > 1:
+                rng = child_rng(seed, "trial", scene.name, object_id)
+                other = grasps[int(rng.integers(1, len(grasps)))]
+                yield (
+                    row | {"rank": "drawn"} | _carried_out(trials, other, frame.T_world_cam, config)
+                )
+
+
+def _carried_out(
+    trials: Trials, grasp: Grasp, T_world_cam: Any, config: GraspConfig
+) -> dict[str, Any]:
+    T = T_world_cam @ grasp.T_cam_gripper
+    outcome = trials.attempt(grasp.object_id, T, grasp.opening, config.approach)
+    return {
+        "result": outcome.result,
+        "score": grasp.score,
+        "quality": grasp.quality,
+        "width": grasp.width,
+        "drift": outcome.drift,
+    }
+
+
+if __name__ == "__main__":
+    main()

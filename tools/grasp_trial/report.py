@@ -1,0 +1,121 @@
+"""Tables of carried out grasps: shares that held, how the others failed, what a score is worth."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from brrp_cli.evaluation.bootstrap import Interval, cluster_bootstrap, mean_interval
+from grasp_trial.trial import HELD, OUTCOMES
+
+BINS = (0.0, 0.5, 0.7, 0.8, 0.9, 0.97, 1.0001)
+Row = dict[str, Any]
+
+
+def report(rows: Sequence[Row], drift: float) -> str:
+    """Markdown. Objects that moved by more than `drift` metres before any hand came are left out:
+    their convex parts do not stand where the true mesh does."""
+    rows = [row for row in rows if row["drift"] is None or row["drift"] <= drift]
+    rng = np.random.default_rng(0)
+    sets = list(dict.fromkeys(row["set"] for row in rows))
+    methods = list(dict.fromkeys(row["method"] for row in rows))
+    return "\n\n".join(
+        [
+            _success(rows, sets, methods, rng),
+            _failures(rows, methods),
+            _reliability([r for r in rows if r["method"] == "default"], rng),
+            _difference(rows, rng),
+        ]
+    )
+
+
+def _best(rows: Sequence[Row], **which: str) -> list[Row]:
+    return [
+        row
+        for row in rows
+        if row["rank"] == "best" and all(row[key] == value for key, value in which.items())
+    ]
+
+
+def _told(found: Interval) -> str:
+    if found.count == 0:
+        return "-"
+    return f"{found.value:.0%} ({found.low:.0%} to {found.high:.0%}), {found.count}"
+
+
+def _success(
+    rows: Sequence[Row], sets: list[str], methods: list[str], rng: np.random.Generator
+) -> str:
+    lines = [
+        "| method | set | best grasp held (95 %), grasps | objects with a grasp |",
+        "| --- | --- | --- | --- |",
+    ]
+    for method in methods:
+        for name in sets:
+            mine = _best(rows, method=method, set=name)
+            tried = [row for row in mine if row["result"] != "none"]
+            held = mean_interval(
+                [float(row["result"] == HELD) for row in tried], [r["scene"] for r in tried], rng
+            )
+            share = f"{len(tried)} of {len(mine)}"
+            lines.append(f"| {method} | {name} | {_told(held)} | {share} |")
+    return "\n".join(lines)
+
+
+def _failures(rows: Sequence[Row], methods: list[str]) -> str:
+    lines = [
+        "| method | " + " | ".join(OUTCOMES) + " |",
+        "| --- |" + " --- |" * len(OUTCOMES),
+    ]
+    for method in methods:
+        counts = Counter(row["result"] for row in _best(rows, method=method))
+        lines.append(f"| {method} | " + " | ".join(str(counts[each]) for each in OUTCOMES) + " |")
+    return "\n".join(lines)
+
+
+def _reliability(rows: Sequence[Row], rng: np.random.Generator) -> str:
+    """How often grasps of `default` held, by score, all that were carried out."""
+    tried = [row for row in rows if row["result"] != "none"]
+    score = np.array([row["score"] for row in tried])
+    held = np.array([row["result"] == HELD for row in tried], dtype=float)
+    scenes = np.array([row["scene"] for row in tried])
+    lines = ["| score | grasps | mean score | held |", "| --- | --- | --- | --- |"]
+    which = np.digitize(score, BINS) - 1
+    for i, (low, high) in enumerate(pairwise(BINS)):
+        mine = which == i
+        if mine.any():
+            share = mean_interval(held[mine], scenes[mine].tolist(), rng)
+            lines.append(
+                f"| {low:g} to {min(high, 1):g} | {mine.sum()} | {score[mine].mean():.2f} |"
+                f" {share.value:.0%} ({share.low:.0%} to {share.high:.0%}) |"
+            )
+    if len(tried):
+        gap = [abs(held[which == i].sum() - score[which == i].sum()) for i in np.unique(which)]
+        lines.append(f"\nExpected calibration error: {sum(gap) / len(tried):.2f}.")
+    return "\n".join(lines)
+
+
+def _difference(rows: Sequence[Row], rng: np.random.Generator) -> str:
+    """By how much ranking by the posterior's score beats ranking by the mean mesh, object by
+    object: one that a method plans no grasp of counts as neither."""
+    pairs: dict[tuple[str, int], dict[str, Row]] = {}
+    for row in _best(rows):
+        if row["method"] in ("default", "mean mesh") and row["result"] != "none":
+            pairs.setdefault((row["scene"], row["object"]), {})[row["method"]] = row
+    both = {key: found for key, found in pairs.items() if len(found) == 2}
+    if not both:
+        return ""
+    scenes = sorted({scene for scene, _ in both})
+    sums = np.zeros((len(scenes), 2))
+    for (scene, _), found in both.items():
+        won = [float(found[name]["result"] == HELD) for name in ("default", "mean mesh")]
+        sums[scenes.index(scene)] += [won[0] - won[1], 1]
+    value, low, high = cluster_bootstrap(sums, lambda t: t[:, 0] / t[:, 1], rng)
+    return (
+        f"Ranking by the posterior's score against the mean mesh, {len(both)} objects of which "
+        f"both plan a grasp: {value:+.0%} ({low:+.0%} to {high:+.0%})."
+    )
