@@ -124,6 +124,19 @@ class Retrieved:
     weight: float | None = None
 
 
+@dataclass(frozen=True)
+class Similar:
+    """A stored object that an object which is none of them is like.
+
+    scales : (3,) of its shape over the stored one, along the axes of its box as it rests, the last
+    upright; weight : in the posterior, a part of that of "none of them"
+    """
+
+    name: str
+    weight: float
+    scales: tuple[float, float, float]
+
+
 @dataclass
 class ObjectReconstruction:
     """What is known of one object after inference.
@@ -134,6 +147,7 @@ class ObjectReconstruction:
     message : for people; may also qualify an "ok"
     n_points : valid observed points; observed : (n, 3) those points, metres, camera frame;
     center : (3,) centre of their bounding box
+    similar : what it is like, should it be none of them, heaviest first
     unknown_weight : of that in the posterior; None where it has none
     posterior, surface : None unless the object got that far
     unknown_probability : that the prior does not hold the object; 0 where retrieval cannot tell
@@ -147,6 +161,7 @@ class ObjectReconstruction:
     center: NDArray[np.float64] | None = None
     observed: NDArray[np.float32] | None = None
     retrieved: list[Retrieved] = field(default_factory=list)
+    similar: list[Similar] = field(default_factory=list)
     unknown_probability: float = 0.0
     unknown_weight: float | None = None
     posterior: StoredPosterior | None = None
@@ -159,6 +174,12 @@ class ObjectReconstruction:
         where none does, or where placements are not verified."""
         heavy = [r for r in self.retrieved if r.weight is not None and r.weight > 0.5]
         return heavy[0] if heavy else None
+
+    @property
+    def like(self) -> Similar | None:
+        """The stored object whose stretched shape this one's is; None where what it is like does
+        not weigh more than a half."""
+        return self.similar[0] if sum(each.weight for each in self.similar) > 0.5 else None
 
 
 @dataclass(frozen=True)

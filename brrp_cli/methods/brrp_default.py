@@ -17,12 +17,13 @@ from brrp_cli.inference.infer_hypotheses import Problem, infer_correction
 from brrp_cli.inference.mean_grid import MeanGrid, grid_over
 from brrp_cli.inference.placed_shape import PlacedShape
 from brrp_cli.inference.posterior import LOGISTIC_DEVIATION
+from brrp_cli.methods.kin_hypotheses import KinHypothesis, kin_hypotheses
 from brrp_cli.observation.ray_samples import ObjectObservation
 from brrp_cli.observation.sensor_noise import depth_deviation
 from brrp_cli.observation.soft_samples import soft_samples
 from brrp_cli.observation.support_plane import Plane
 from brrp_cli.prior.store import Prior
-from brrp_cli.reconstruction import OK, ObjectReconstruction, Retrieved
+from brrp_cli.reconstruction import OK, ObjectReconstruction, Retrieved, Similar
 from brrp_cli.registration.model import search_model
 from brrp_cli.registration.pose_covariance import pose_covariance
 from brrp_cli.registration.pose_search import Hypothesis, search
@@ -84,8 +85,22 @@ def reconstruct_by_hypotheses(
         weights = weigh(
             shares, [each.alignment_score for each in placed], missing, hypotheses.weigh
         )
+        like: list[KinHypothesis] = []
+        if weights[-1] >= hypotheses.kin.least_unknown:
+            like = kin_hypotheses(
+                observation.points, frame, object_id, plane, prior, hypotheses, seed
+            )
         posterior = _infer(
-            observation, frame, plane, wave, placed, weights, hypotheses, seed=seed, device=device
+            observation,
+            frame,
+            plane,
+            wave,
+            placed,
+            like,
+            weights,
+            hypotheses,
+            seed=seed,
+            device=device,
         )
     ends = np.cumsum([0, *(len(group) for group in found)])
     return ObjectReconstruction(
@@ -99,6 +114,9 @@ def reconstruct_by_hypotheses(
             for (name, probability), group, a, b in zip(
                 chosen, found, ends[:-1], ends[1:], strict=True
             )
+        ],
+        similar=[
+            Similar(each.shape.name, float(weights[-1]) * each.share, each.scales) for each in like
         ],
         unknown_probability=missing,
         unknown_weight=float(weights[-1]),
@@ -133,17 +151,26 @@ def _infer(
     plane: Plane | None,
     wave: float,
     placed: list[Hypothesis],
+    like: list[KinHypothesis],
     weights: Array,
     config: HypothesesConfig,
     *,
     seed: int,
     device: str,
 ) -> HypothesisPosterior:
-    """Only hypotheses that weigh something cost a mean function."""
+    """Only hypotheses that weigh something cost a mean function. Kin come before the completion,
+    and share its weight."""
+    none = weights[-1]
+    shares = [none * each.share for each in like]
+    weights = np.array([*weights[:-1], *shares, none - sum(shares)])
     kept = _kept(weights, config.map)
     weights = weights[kept] / weights[kept].sum()
     shapes = [
-        _placed_shape(placed[i], observation.points, wave, config) for i in kept if i < len(placed)
+        _placed_shape(placed[i], observation.points, wave, config)
+        if i < len(placed)
+        else like[i - len(placed)].shape
+        for i in kept
+        if i < len(placed) + len(like)
     ]
     part = None
     if len(shapes) < len(kept):
@@ -160,7 +187,8 @@ def _infer(
     if part is not None:
         means.append(_completed(part, box, frame, observation.object_id, plane, config.mean))
     stiffness = np.ones(len(means))
-    stiffness[: len(shapes)] = config.map.stiffness
+    # Kin are known no better than a completed shape.
+    stiffness[: len(shapes)] = [1.0 if each.kin else config.map.stiffness for each in shapes]
     samples = soft_samples(observation, frame, config.map.behind, config.sensor)
     noise = config.sensor.sure * depth_deviation(observation.center[2:], config.sensor)[0]
     return infer_correction(

@@ -47,13 +47,15 @@ def extract_surface(
         deviation = moved_to_level(through, config.level).deviation
         check_finite("The surface", vertices=moved.vertices, uncertainty=deviation)
         if moved.off <= config.most_off:
-            shape = placed(posterior, posterior.dominant).shape
+            explained = placed(posterior, posterior.dominant)
+            shape = explained.shape
             return Surface(
                 moved.vertices,
                 shape.faces.astype(np.int64),
                 deviation,
                 posterior.surface_unit,
-                shape.colours,
+                # What is only like a stored object has the colours of the image.
+                None if explained.kin else shape.colours,
             )
     spacing = grid_spacing(posterior.bounds, config)
     axes = grid_axes(posterior.bounds, spacing)

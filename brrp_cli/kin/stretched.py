@@ -1,0 +1,59 @@
+"""The mesh and the distances of a stored shape, stretched."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brrp_cli.config import KinConfig
+from brrp_cli.geometry import similarity
+from brrp_cli.kin.library import Library
+from brrp_cli.kin.placement import Placements, distance_and_slopes
+from brrp_cli.prior.distance_field import DistanceField
+from brrp_cli.prior.shape import StoredShape
+
+Array = NDArray[np.float64]
+
+
+def stretched(
+    placements: Placements, row: int, stored: StoredShape, library: Library, config: KinConfig
+) -> StoredShape:
+    """The shape of placement `row`, metres, about the middle of its box, axes of its stance.
+
+    stored : of the object that it is made of. Far from the surface, distances are right to first
+    order.
+    """
+    stance, half = placements.stance[row], placements.half[row].astype(np.float64)
+    inverse = np.linalg.inv(library.to_object[stance].astype(np.float64))
+    u = (stored.vertices - library.origin[stance]) @ inverse.T
+    reach = half + config.margin
+    spacing = float((np.prod(2 * reach) / config.field_nodes) ** (1 / 3))
+    shape = np.ceil(2 * reach / spacing).astype(np.int64) + 1
+    lower = -(shape - 1) * spacing / 2
+    axes = [start + spacing * np.arange(n) for start, n in zip(lower, shape, strict=True)]
+    nodes = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
+    at_rest = Placements(
+        placements.stance[[row]],
+        np.zeros(1, np.float32),
+        np.zeros((1, 3), np.float32),
+        placements.half[[row]],
+    )
+    distance, _, _ = distance_and_slopes(at_rest, nodes.astype(np.float32), library)
+    # Where a field is flat its slope says nothing: no node is further away than the box is long.
+    longest = 2 * float(np.linalg.norm(reach))
+    values = np.clip(distance[0], -longest, longest).reshape(tuple(shape))
+    return StoredShape(
+        (u * half).astype(np.float32),
+        stored.faces,
+        stored.colours,
+        DistanceField(lower, spacing, values.astype(np.float32)),
+    )
+
+
+def pose(placements: Placements, row: int) -> Array:
+    """T_plane_shape (4, 4), rigid, of the shape that `stretched` gives."""
+    c, s = np.cos(float(placements.turn[row])), np.sin(float(placements.turn[row]))
+    return similarity(
+        rotation=np.array([[c, -s, 0], [s, c, 0], [0, 0, 1.0]]),
+        translation=placements.middle[row].astype(np.float64),
+    )
