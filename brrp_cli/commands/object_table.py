@@ -26,8 +26,9 @@ _RIGHT = ("id", "weight", "size", "± mm", "s")
 class Told:
     """What is told of one object.
 
-    taken_for : the stored object, None = none of them or nothing known; how : "recognised", "not in
-    the prior", "retrieved" (a method that weighs no placements) or "" (one without a prior)
+    taken_for : the stored object, None = none of them or nothing known; how : "recognised",
+    "similar" (it has that object's shape, stretched), "not in the prior", "retrieved" (a method that
+    weighs no placements) or "" (one without a prior)
     weight : of that in the posterior, or the probability of what was retrieved
     size_factor : of a recognised object, over its stored size
     uncertainty : mean over the mesh, metres; None in other units
@@ -90,6 +91,8 @@ def _outcome(
     found = item.recognised
     if found is not None:
         return found.name, "recognised", found.weight, found.size_factor
+    if item.like is not None:
+        return item.like.name, "similar", sum(each.weight for each in item.similar), None
     if item.unknown_weight is not None:
         return None, "not in the prior", item.unknown_weight, None
     if item.retrieved:
@@ -145,6 +148,8 @@ def _row(each: Told) -> tuple[str, ...]:
     name = each.taken_for or each.how or "-"
     if each.how == "retrieved":
         name += " (retrieved)"
+    if each.how == "similar":
+        name = f"like {name}"
     # Of a failure the log has told the rest.
     said = each.message.split("\n")[0]
     status = [] if each.status == OK else [each.status]

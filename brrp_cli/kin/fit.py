@@ -43,9 +43,9 @@ class Fits:
 
 def judged(placements: Placements, evidence: Evidence, library: Library, config: KinConfig) -> Fits:
     """Placements with their scores, in their order."""
-    distance, _, _ = distance_and_slopes(
+    distance = distance_and_slopes(
         placements, np.concatenate([evidence.seen, evidence.free]), library
-    )
+    )[0]
     on, at = distance[:, : len(evidence.seen)], distance[:, len(evidence.seen) :]
     near = np.exp(-0.5 * np.square(on) / (config.near**2 + evidence.noise**2)).mean(axis=1)
     far = (np.minimum(np.abs(on), config.far) / config.far).mean(axis=1)
@@ -63,6 +63,7 @@ def judged(placements: Placements, evidence: Evidence, library: Library, config:
         - config.free_weight * inside
         - config.pull * (np.square(mean / config.size_deviation))
         - config.pull * np.square(stretch / config.stretch_deviation)
+        - config.pull * np.square(placements.taper / config.taper_deviation)
     )
     return Fits(placements, near, far, violation, inside, mean, stretch, score)
 

@@ -37,6 +37,8 @@ PARTS = (
 HELD = 2
 # Of a quarter of a circle; normalised, of a sheet.
 TURNS, LEAST_HALF = 90, 1e-3
+# Normalised: a point that lies so far outside is not on the surface.
+CLEAR = 0.03
 
 _BUILDING = Lock()
 
@@ -100,6 +102,7 @@ class Library:
     to_object : (E, 3, 3), (E, 3): normalised coordinates of the object are to_object @ u + origin
     coarse : (E, nodes**3, 4) distance, metres, and the squares of its unit gradient, at nodes of u
     between -reach and reach; surface : (E, n, 3) points of the surface, u
+    hollow : (E,) share of the points halfway between two of the surface that lie outside
     """
 
     names: list[str]
@@ -111,6 +114,7 @@ class Library:
     origin: Floats
     coarse: NDArray[np.float16]
     surface: Floats
+    hollow: Floats
     reach: float
 
 
@@ -190,9 +194,22 @@ def library_of(shapes: Sequence[KinShape], config: KinConfig) -> Library:
         origin,
         np.empty((0, 0, 4), np.float16),
         surface,
+        _hollow(fields, [each.surface for each in shapes])[of],
         config.reach,
     )
     return replace(bare, coarse=_coarse(bare, config))
+
+
+def _hollow(fields: Fields, surfaces: Sequence[Floats]) -> Floats:
+    """(O,) of each shape: 0 of a convex one, about a half of a bowl."""
+    found = np.empty(len(surfaces), np.float32)
+    for number, surface in enumerate(surfaces):
+        # The points are in random order.
+        half = len(surface) // 2
+        middle = (surface[:half] + surface[half : 2 * half]) / 2
+        distance, _ = fields.distance_and_gradient(np.array([number]), middle.T[:, None])
+        found[number] = (distance > CLEAR).mean()
+    return found
 
 
 def _stances(shape: KinShape, config: KinConfig) -> Iterator[tuple[Array, Array, Array, Array]]:

@@ -45,6 +45,7 @@ def proposals(evidence: Evidence, library: Library, config: KinConfig) -> Placem
                     np.full(len(size), turn, np.float32),
                     np.column_stack([middle, tall]).astype(np.float32),
                     np.column_stack([wide, tall]).astype(np.float32),
+                    np.zeros(len(size), np.float32),
                 )
             )
     every = joined(found)

@@ -14,27 +14,30 @@ from brrp_cli.kin.placement import Placements, distance_and_slopes
 Floats = NDArray[np.float32]
 Array = NDArray[np.float64]
 
-# Of the unknowns: turn, middle (3), logarithms of half (3).
-UNKNOWNS = 7
-# A step of each: radians, metres, logarithms.
-LARGEST = np.array([0.35, *[0.03] * 3, *[0.3] * 3])
+# Turn, middle (3), logarithms of half (3), taper.
+UNKNOWNS = 8
+# A step of each at most: radians, metres, logarithms, a share.
+LARGEST = np.array([0.35, *[0.03] * 3, *[0.3] * 3, 0.15])
+# A cone to its tip has 1.
+MOST_TAPER = 0.6
 
 
 def refined(
     placements: Placements, evidence: Evidence, library: Library, config: KinConfig
 ) -> Placements:
-    """Each placement after `config.steps` steps over turn, middle and the three scales."""
+    """Each placement after `config.steps` steps over turn, middle, the three scales and taper."""
     seen, free = evidence.seen[: config.step_seen], evidence.free[: config.step_free]
     points = np.concatenate([seen, free])
     for _ in range(config.steps):
-        distance, u, slope = distance_and_slopes(placements, points, library)
-        rows = _jacobian(placements, u, slope)
+        distance, u, slope, across = distance_and_slopes(placements, points, library)
+        rows = _jacobian(placements, u, slope, across)
         weight = _weights(distance, len(seen), config)
         residual = distance.astype(np.float64)
         # A point of free space asks the surface to be no nearer than its own side of it.
         residual[:, len(seen) :] = np.minimum(residual[:, len(seen) :], 0)
-        H = np.einsum("bn,ibn,jbn->bij", weight, rows, rows, optimize=True)
-        g = np.einsum("bn,ibn,bn->bi", weight, rows, residual, optimize=True)
+        by_fit = rows.transpose(1, 0, 2)
+        H = (by_fit * weight[:, None]) @ by_fit.transpose(0, 2, 1)
+        g = (by_fit @ (weight * residual)[..., None])[..., 0]
         prior_H, prior_g = _prior(placements, library, config)
         H += prior_H
         g += prior_g
@@ -44,15 +47,24 @@ def refined(
     return placements
 
 
-def _jacobian(placements: Placements, u: Floats, slope: Floats) -> Array:
-    """Rows (7, B, n): of the distance along each unknown."""
+def _jacobian(placements: Placements, u: Floats, slope: Floats, across: Floats) -> Array:
+    """Rows (8, B, n): of the distance along each unknown."""
     c, s = np.cos(placements.turn)[:, None], np.sin(placements.turn)[:, None]
     half = placements.half.T[:, :, None]
-    x, y, z = slope / half  # along the turned axes, per metre
-    about = x * (u[1] * half[1]) - y * (u[0] * half[0])
-    return np.stack(
-        [about, -(c * x - s * y), -(s * x + c * y), -z, *(-slope * u)], dtype=np.float64
-    )
+    wide = placements.widened(u[2])
+    x, y, z = across
+    sideways = slope[0] * u[0], slope[1] * u[1]
+    rows = [
+        (x * u[1] * half[1] - y * u[0] * half[0]) * wide,
+        s * y - c * x,
+        -s * x - c * y,
+        -z,
+        -sideways[0],
+        -sideways[1],
+        -u[2] * half[2] * z,
+        -(sideways[0] + sideways[1]) * np.clip(u[2], -1, 1) / wide,
+    ]
+    return np.stack(rows).astype(np.float64)
 
 
 def _weights(distance: Floats, seen: int, config: KinConfig) -> Array:
@@ -65,7 +77,7 @@ def _weights(distance: Floats, seen: int, config: KinConfig) -> Array:
 
 
 def _prior(placements: Placements, library: Library, config: KinConfig) -> tuple[Array, Array]:
-    """Hessian (B, 7, 7) and gradient (B, 7) of sizes, stretches and the height of the underside."""
+    """Hessian (B, 8, 8) and gradient (B, 8) of sizes, stretches, taper and the height of the underside."""
     count = len(placements)
     log = np.log(placements.half / library.half[placements.stance]).astype(np.float64)
     H, g = np.zeros((count, UNKNOWNS, UNKNOWNS)), np.zeros((count, UNKNOWNS))
@@ -73,8 +85,11 @@ def _prior(placements: Placements, library: Library, config: KinConfig) -> tuple
     metric = (
         mean / 3 / config.size_deviation**2 + spread / config.stretch_deviation**2
     ) * config.pull
-    H[:, 4:, 4:] += metric
-    g[:, 4:] += log @ metric
+    H[:, 4:7, 4:7] += metric
+    g[:, 4:7] += log @ metric
+    taper = config.pull / config.taper_deviation**2
+    H[:, 7, 7] += taper
+    g[:, 7] += taper * placements.taper
     # Underside: middle_z - half_z.
     row = np.zeros((count, UNKNOWNS))
     row[:, 3], row[:, 6] = 1, -placements.half[:, 2]
@@ -90,5 +105,6 @@ def _moved(placements: Placements, step: Array) -> Placements:
         placements.stance,
         (placements.turn + step[:, 0]).astype(np.float32),
         (placements.middle + step[:, 1:4]).astype(np.float32),
-        (placements.half * np.exp(step[:, 4:])).astype(np.float32),
+        (placements.half * np.exp(step[:, 4:7])).astype(np.float32),
+        np.clip(placements.taper + step[:, 7], -MOST_TAPER, MOST_TAPER).astype(np.float32),
     )

@@ -23,27 +23,29 @@ def stretched(
     stored : of the object that it is made of. Far from the surface, distances are right to first
     order.
     """
-    stance, half = placements.stance[row], placements.half[row].astype(np.float64)
+    stance = placements.stance[row]
     inverse = np.linalg.inv(library.to_object[stance].astype(np.float64))
     u = (stored.vertices - library.origin[stance]) @ inverse.T
-    reach = half + config.margin
-    spacing = float((np.prod(2 * reach) / config.field_nodes) ** (1 / 3))
-    shape = np.ceil(2 * reach / spacing).astype(np.int64) + 1
-    lower = -(shape - 1) * spacing / 2
-    axes = [start + spacing * np.arange(n) for start, n in zip(lower, shape, strict=True)]
-    nodes = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
     at_rest = Placements(
         placements.stance[[row]],
         np.zeros(1, np.float32),
         np.zeros((1, 3), np.float32),
         placements.half[[row]],
+        placements.taper[[row]],
     )
-    distance, _, _ = distance_and_slopes(at_rest, nodes.astype(np.float32), library)
+    vertices = at_rest.placed(u[None])[:, 0].T
+    reach = np.abs(vertices).max(axis=0) + config.margin
+    spacing = float((np.prod(2 * reach) / config.field_nodes) ** (1 / 3))
+    shape = np.ceil(2 * reach / spacing).astype(np.int64) + 1
+    lower = -(shape - 1) * spacing / 2
+    axes = [start + spacing * np.arange(n) for start, n in zip(lower, shape, strict=True)]
+    nodes = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
+    distance = distance_and_slopes(at_rest, nodes.astype(np.float32), library)[0]
     # Where a field is flat its slope says nothing: no node is further away than the box is long.
     longest = 2 * float(np.linalg.norm(reach))
     values = np.clip(distance[0], -longest, longest).reshape(tuple(shape))
     return StoredShape(
-        (u * half).astype(np.float32),
+        vertices.astype(np.float32),
         stored.faces,
         stored.colours,
         DistanceField(lower, spacing, values.astype(np.float32)),

@@ -57,7 +57,8 @@ def kin_hypotheses(
     library = kin_library(prior, kin)
     fits = fit_kin(evidence, library, kin)
     rows = _distinct(fits, library, kin)
-    shares = kin_shares(fits.score[rows], len(evidence.seen), kin)
+    hollow = library.hollow[fits.placements.stance[rows]]
+    shares = kin_shares(fits.score[rows], hollow, len(evidence.seen), kin)
     limit = config.mean.limit
     return [
         _hypothesis(int(row), float(share), fits, evidence, library, prior, limit, kin)
@@ -66,15 +67,21 @@ def kin_hypotheses(
     ]
 
 
-def kin_shares(score: NDArray[np.floating], seen: int, config: KinConfig) -> Array:
+def kin_shares(
+    score: NDArray[np.floating], hollow: NDArray[np.floating], seen: int, config: KinConfig
+) -> Array:
     """Shares (k,) of fits with scores (k,), best first: that of all of them follows from the best
     one's, that of each from its distance to it.
 
+    hollow : (k,) of each shape; the completion is worse at walls than at solids
     seen : observed points; of few of them nothing is certain
     """
     if not len(score):
         return np.zeros(0)
-    together = expit(config.sharpness * (float(score[0]) - config.convincing))
+    low, high = config.hollow
+    walls = float(np.clip((hollow[0] - low) / (high - low), 0, 1))
+    gained = float(score[0]) + config.hollow_bonus * walls - config.convincing
+    together = expit(config.sharpness * gained)
     together *= min(1.0, seen / config.many_seen)
     relative = np.exp(config.sharpness * (score.astype(np.float64) - float(score[0])))
     return np.asarray(together * relative / relative.sum())
@@ -89,7 +96,7 @@ def _distinct(fits: Fits, library: Library, config: KinConfig) -> NDArray[np.int
         points = surfaces[:, row, :: config.distinct_step].T
         if kept:
             known = fits.placements[np.array(kept)]
-            distance, _, _ = distance_and_slopes(known, points, library)
+            distance = distance_and_slopes(known, points, library)[0]
             if np.abs(distance).mean(axis=1).min() < config.distinct:
                 continue
         kept.append(row)
