@@ -27,8 +27,8 @@ class Told:
     """What is told of one object.
 
     taken_for : the stored object, None = none of them or nothing known; how : "recognised",
-    "similar" (it has that object's shape, stretched), "not in the prior", "retrieved" (a method that
-    weighs no placements) or "" (one without a prior)
+    "similar" (it has that object's shape, stretched), "not in the prior", "retrieved" (a method
+    that weighs no placements) or "" (one without a prior)
     weight : of that in the posterior, or the probability of what was retrieved
     size_factor : of a recognised object, over its stored size
     uncertainty : mean over the mesh, metres; None in other units

@@ -28,13 +28,13 @@ class KinConfig:
     between the shares `most` of the points, `least_half` at least; sizes whose mean logarithm is
     beyond `most_size`, or of which one is off the mean by more than `most_stretch`, are left out.
     They are held against `coarse_seen` observed and `coarse_free` free points, to `coarse_near`
-    metres. The best `starts` of them, `starts_each` of one object at most, take `steps` Gauss-
-    Newton steps with `step_seen` and `step_free` points, damped by a share `damping`. `sigma`,
-    `free_sigma` : metres, standard deviations of the distances of seen points and of free ones
-    inside of the shape; `robust` : metres, from which on points pull less (Geman and McClure);
-    `pull` : weight of the prior, by which logarithms of sizes have the standard deviation
-    `size_deviation`, their differences `stretch_deviation`, the taper `taper_deviation`, and the
-    underside `lift_deviation` metres about the plane.
+    metres. The best `starts` of them, `starts_each` of one object at most, take `steps`
+    Gauss-Newton steps with `step_seen` and `step_free` points, damped by a share `damping`.
+    `sigma`, `free_sigma` : metres, standard deviations of the distances of seen points and of free
+    ones inside of the shape, which count `free_pull` times; `robust` : metres, from which on points
+    pull less (Geman and McClure); `pull` : weight of the prior, by which logarithms of sizes have
+    the standard deviation `size_deviation`, their differences `stretch_deviation`, the taper
+    `taper_deviation`, and the underside `lift_deviation` metres about the plane.
     Scores: `near` : metres, with the sensor's noise the standard deviation of the Gaussian of
     observed points' distances; `far` : one further away counts as this far; `violation_weight` : of
     the share of the surface that stands in free space or below the plane, from `tolerance` metres
@@ -42,11 +42,13 @@ class KinConfig:
     Hypotheses: of the best `kept` fits the best `hypotheses` that lie `distinct` metres apart, at
     every `distinct_step`-th point. Their weight is a logistic function of the best score, a half at
     `convincing`, with the slope `sharpness`; of a shape whose share of hollow space reaches from
-    the first to the second of `hollow`, a half by up to `hollow_bonus` earlier; and less where
-    fewer than `many_seen` cells were seen, none below `least_seen`; what weighs less than
-    `least_share` is left out. The logit is the distance over `width` metres, which grows by `doubt`
-    for each unit that the mean Gaussian falls short of `sure`, and is exact to `exact` metres;
-    distances are kept on `field_nodes` nodes up to `margin` metres around.
+    the first to the second of `hollow`, a half by up to `hollow_bonus` earlier, and one that is
+    solid weighs `solid_most` at most: of solids the completion is as good, and their mean is better
+    than either; and less where fewer than `many_seen` cells were seen, none below `least_seen`;
+    what weighs less than `least_share` is left out. The logit is the distance over `width` metres,
+    which grows by `doubt` for each unit that the mean Gaussian falls short of `sure`, and of hollow
+    shapes is exact to `exact` metres; distances are kept on `field_nodes` nodes up to `margin`
+    metres around.
     """
 
     enabled: bool = True
@@ -80,7 +82,8 @@ class KinConfig:
     sigma: float = 0.003
     robust: float = 0.009
     free_sigma: float = 0.003
-    pull: float = 0.05
+    free_pull: float = 5.0
+    pull: float = 0.03
     size_deviation: float = 0.5
     stretch_deviation: float = 0.25
     taper_deviation: float = 0.15
@@ -97,8 +100,9 @@ class KinConfig:
     distinct_step: int = 4
     convincing: float = 0.42
     sharpness: float = 16.0
-    hollow: tuple[float, float] = (0.25, 0.45)
-    hollow_bonus: float = 0.2
+    hollow: tuple[float, float] = (0.4, 0.55)
+    hollow_bonus: float = 0.3
+    solid_most: float = share(0.45)
     many_seen: int = 250
     least_seen: int = 40
     least_share: float = share(0.03)

@@ -35,8 +35,8 @@ class PlacedShape:
     T_cam_shape : (4, 4) similarity from the shape's coordinates; width : metres, scale of the
     logistic function across the surface; limit : of the logit
     kin : whether the shape was stretched to fit an object that is not the stored one but like it
-    exact : metres from the surface within which distances are; None: where the logit is not at its
-    limit
+    exact : metres from the surface within which distances are, 0: nowhere; None: where the logit is
+    not at its limit
     """
 
     kind: ClassVar[str] = "shape"
@@ -93,8 +93,12 @@ class PlacedShape:
 
     def logits(self, points: NDArray[np.floating]) -> NDArray[np.float32]:
         """m (n,) at points (n, 3), metres, camera frame."""
-        band = self.limit * self.width if self.exact is None else self.exact
-        distance = self.signed_distance(points, band)
+        if self.exact == 0:
+            local = transform_points(np.linalg.inv(self.T_cam_shape), np.asarray(points))
+            distance = self.shape.field.signed_distance(local) * self.unit
+        else:
+            band = self.limit * self.width if self.exact is None else self.exact
+            distance = self.signed_distance(points, band)
         limited = np.clip(-distance / self.width, -self.limit, self.limit)
         return np.asarray(limited, dtype=np.float32)
 

@@ -68,16 +68,16 @@ def _jacobian(placements: Placements, u: Floats, slope: Floats, across: Floats) 
 
 
 def _weights(distance: Floats, seen: int, config: KinConfig) -> Array:
-    """Geman and McClure's for seen points; those inside free space count fully."""
+    """Geman and McClure's for seen points; free ones that are inside count fully."""
     weight = np.empty(distance.shape, np.float64)
     on, at = distance[:, :seen], distance[:, seen:]
     weight[:, :seen] = (1 / (1 + (on / config.robust) ** 2)) ** 2 / config.sigma**2 / max(seen, 1)
-    weight[:, seen:] = config.free_weight * (at < 0) / config.free_sigma**2 / max(at.shape[1], 1)
+    weight[:, seen:] = config.free_pull * (at < 0) / config.free_sigma**2 / max(at.shape[1], 1)
     return weight
 
 
 def _prior(placements: Placements, library: Library, config: KinConfig) -> tuple[Array, Array]:
-    """Hessian (B, 8, 8) and gradient (B, 8) of sizes, stretches, taper and the height of the underside."""
+    """Hessian (B, 8, 8) and gradient (B, 8) of sizes, stretches, taper and the underside."""
     count = len(placements)
     log = np.log(placements.half / library.half[placements.stance]).astype(np.float64)
     H, g = np.zeros((count, UNKNOWNS, UNKNOWNS)), np.zeros((count, UNKNOWNS))

@@ -78,13 +78,19 @@ def kin_shares(
     """
     if not len(score):
         return np.zeros(0)
-    low, high = config.hollow
-    walls = float(np.clip((hollow[0] - low) / (high - low), 0, 1))
+    walls = float(_walls(hollow[:1], config)[0])
     gained = float(score[0]) + config.hollow_bonus * walls - config.convincing
     together = expit(config.sharpness * gained)
+    together *= config.solid_most + (1 - config.solid_most) * walls
     together *= min(1.0, seen / config.many_seen)
     relative = np.exp(config.sharpness * (score.astype(np.float64) - float(score[0])))
     return np.asarray(together * relative / relative.sum())
+
+
+def _walls(hollow: NDArray[np.floating], config: KinConfig) -> Array:
+    """(k,) from 0, a solid, to 1, a hollow thing, of shares of hollow space."""
+    low, high = config.hollow
+    return np.clip((np.asarray(hollow, np.float64) - low) / (high - low), 0, 1)
 
 
 def _distinct(fits: Fits, library: Library, config: KinConfig) -> NDArray[np.int64]:
@@ -128,7 +134,7 @@ def _hypothesis(
         # How far the shape is off says its width; the place is part of it.
         np.zeros((6, 6)),
         kin=True,
-        exact=config.exact,
+        exact=config.exact if _walls(library.hollow[[stance]], config)[0] > 0 else 0.0,
     )
     x, y, z = (float(s) for s in placements.half[row] / library.half[stance])
     return KinHypothesis(shape, share, (x, y, z))
