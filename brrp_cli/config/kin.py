@@ -38,7 +38,8 @@ class KinConfig:
     Scores: `near` : metres, with the sensor's noise the standard deviation of the Gaussian of
     observed points' distances; `far` : one further away counts as this far; `violation_weight` : of
     the share of the surface that stands in free space or below the plane, from `tolerance` metres
-    on and fully from `tolerance + slope`; `free_weight` : of free points within.
+    on and fully from `tolerance + slope`; `free_weight` : of free points within; `lost_weight` : of
+    observed points further than `lost` metres away. All points move the best `kept` fits once more.
     Hypotheses: of the best `kept` fits the best `hypotheses` that lie `distinct` metres apart, at
     every `distinct_step`-th point. Their weight is a logistic function of the best score, a half at
     `convincing`, with the slope `sharpness`; of a shape whose share of hollow space reaches from
@@ -94,6 +95,8 @@ class KinConfig:
     tolerance: float = 0.004
     slope: float = 0.008
     free_weight: float = 1.0
+    lost: float = 0.008
+    lost_weight: float = 1.0
     kept: int = 8
     hypotheses: int = 3
     distinct: float = 0.0015

@@ -39,7 +39,7 @@ class Evidence:
     depth: Floats
     noise: float
 
-    def free_depth(self, points: Array) -> Array:
+    def free_depth(self, points: NDArray[np.floating]) -> Array:
         """How far (n,) points (n, 3), metres, camera frame, stand in space that was seen to be
         free; NaN where nothing tells: beside the silhouette, where a pixel may be anyone's."""
         return np.asarray(at_pixels(points, self.depth, self.frame) - points[:, 2])
@@ -66,7 +66,7 @@ def gather(
         transform_points(T_plane_cam, seen.astype(np.float64)).astype(np.float32),
         placed[placed[:, 2] > 0],
         T_plane_cam[:3, 3].astype(np.float32),
-        np.linalg.inv(T_plane_cam),
+        np.asarray(np.linalg.inv(T_plane_cam), dtype=np.float64),
         frame,
         _told_depth(frame, object_id, config.ring[0]),
         float(depth_deviation(np.median(points[:, 2]), sensor)),

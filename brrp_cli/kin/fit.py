@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,7 +24,8 @@ class Fits:
 
     near : mean of a Gaussian of the seen points' distances; far : mean of these, limited, over the
     limit; violation : share of the surface in free space or below the plane; inside : share of free
-    points within; size, stretch : of the logarithms of the scales; score : of all of it
+    points within; lost : share of seen points that it does not explain at all; size, stretch : of
+    the logarithms of the scales; score : of all of it
     """
 
     placements: Placements
@@ -32,13 +33,23 @@ class Fits:
     far: Floats
     violation: Floats
     inside: Floats
+    lost: Floats
     size: Floats
     stretch: Floats
     score: Floats
 
     def __getitem__(self, rows: NDArray[np.integer]) -> Fits:
-        each = (self.near, self.far, self.violation, self.inside, self.size, self.stretch)
-        return Fits(self.placements[rows], *(one[rows] for one in each), self.score[rows])
+        return Fits(
+            self.placements[rows],
+            self.near[rows],
+            self.far[rows],
+            self.violation[rows],
+            self.inside[rows],
+            self.lost[rows],
+            self.size[rows],
+            self.stretch[rows],
+            self.score[rows],
+        )
 
 
 def judged(placements: Placements, evidence: Evidence, library: Library, config: KinConfig) -> Fits:
@@ -49,6 +60,7 @@ def judged(placements: Placements, evidence: Evidence, library: Library, config:
     on, at = distance[:, : len(evidence.seen)], distance[:, len(evidence.seen) :]
     near = np.exp(-0.5 * np.square(on) / (config.near**2 + evidence.noise**2)).mean(axis=1)
     far = (np.minimum(np.abs(on), config.far) / config.far).mean(axis=1)
+    lost = (np.abs(on) > config.lost).mean(axis=1)
     inside = np.clip((-at - config.tolerance) / config.slope, 0, 1).sum(axis=1) / max(
         at.shape[1], 1
     )
@@ -61,11 +73,12 @@ def judged(placements: Placements, evidence: Evidence, library: Library, config:
         - far
         - config.violation_weight * violation
         - config.free_weight * inside
+        - config.lost_weight * lost
         - config.pull * (np.square(mean / config.size_deviation))
         - config.pull * np.square(stretch / config.stretch_deviation)
         - config.pull * np.square(placements.taper / config.taper_deviation)
     )
-    return Fits(placements, near, far, violation, inside, mean, stretch, score)
+    return Fits(placements, near, far, violation, inside, lost, mean, stretch, score)
 
 
 def _violation(
@@ -85,6 +98,11 @@ def fit_kin(evidence: Evidence, library: Library, config: KinConfig) -> Fits:
     begun = starts(evidence, library, config)
     if not len(begun):
         return judged(begun, evidence, library, config)
-    fits = judged(refined(begun, evidence, library, config), evidence, library, config)
-    order = np.argsort(-fits.score, kind="stable")
-    return fits[order[: config.kept]]
+    fits = _best(refined(begun, evidence, library, config), evidence, library, config)
+    every = replace(config, step_seen=len(evidence.seen), step_free=len(evidence.free))
+    return _best(refined(fits.placements, evidence, library, every), evidence, library, config)
+
+
+def _best(placements: Placements, evidence: Evidence, library: Library, config: KinConfig) -> Fits:
+    fits = judged(placements, evidence, library, config)
+    return fits[np.argsort(-fits.score, kind="stable")[: config.kept]]

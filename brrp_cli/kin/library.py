@@ -206,7 +206,7 @@ def _hollow(fields: Fields, surfaces: Sequence[Floats]) -> Floats:
     for number, surface in enumerate(surfaces):
         # The points are in random order.
         half = len(surface) // 2
-        middle = (surface[:half] + surface[half : 2 * half]) / 2
+        middle = ((surface[:half] + surface[half : 2 * half]) / 2).astype(np.float32)
         distance, _ = fields.distance_and_gradient(np.array([number]), middle.T[:, None])
         found[number] = (distance > CLEAR).mean()
     return found

@@ -65,7 +65,7 @@ def starts(evidence: Evidence, library: Library, config: KinConfig) -> Placement
             _score(every[np.arange(a, min(a + CHUNK, len(every)))], evidence, library, config)
             for a in range(0, len(every), CHUNK)
         ]
-        or [np.zeros(0)]
+        or [np.zeros(0, np.float32)]
     )
     order = np.argsort(-score, kind="stable")
     shape = library.object[every.stance[order]]

@@ -42,7 +42,7 @@ def refined(
         H += prior_H
         g += prior_g
         H[:, range(UNKNOWNS), range(UNKNOWNS)] *= 1 + config.damping
-        step = -np.linalg.solve(H, g[..., None])[..., 0]
+        step = -np.asarray(np.linalg.solve(H, g[..., None])[..., 0], dtype=np.float64)
         placements = _moved(placements, step)
     return placements
 

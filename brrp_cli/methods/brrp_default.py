@@ -187,8 +187,7 @@ def _infer(
     if part is not None:
         means.append(_completed(part, box, frame, observation.object_id, plane, config.mean))
     stiffness = np.ones(len(means))
-    # Kin are known no better than a completed shape.
-    stiffness[: len(shapes)] = [1.0 if each.kin else config.map.stiffness for each in shapes]
+    stiffness[: len(shapes)] = config.map.stiffness
     samples = soft_samples(observation, frame, config.map.behind, config.sensor)
     noise = config.sensor.sure * depth_deviation(observation.center[2:], config.sensor)[0]
     return infer_correction(

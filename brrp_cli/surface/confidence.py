@@ -132,7 +132,9 @@ def _around_stored_mesh(
     empty: Empty | None,
 ) -> ConfidenceSurface | None:
     """The same along the normals of a recognised object's mesh, which no grid makes coarser; None
-    where the frame contradicts the stored shape."""
+    where the frame contradicts the stored shape, and of kin, whose shape is in doubt."""
+    if placed(posterior, number).kin:
+        return None
     through = along_normals(posterior, number, config)
     best = moved_to_level(through, config.level, through.own)
     if best.off > config.most_off:
