@@ -23,7 +23,8 @@ class KinConfig:
     What was seen: `seen_points` observed points at most, merged in cells of `cell` metres, and
     `free_points` of free space, from `free_gap` metres in front of the measured depth on, a share
     `free_beside` of them in a ring of pixels about the silhouette, from the first of `ring` to the
-    second. Nearer to it a pixel may be anyone's.
+    second. Nearer to it a pixel may be anyone's. The surface
+    stands in free space where all pixels within `blur` pixels say so.
     First tries: every pose in `turns` turns. Sizes follow from the extents of what was seen,
     between the shares `most` of the points, `least_half` at least; sizes whose mean logarithm is
     beyond `most_size`, or of which one is off the mean by more than `most_stretch`, are left out.
@@ -66,6 +67,7 @@ class KinConfig:
     free_gap: float = 0.008
     free_beside: float = share(0.6)
     ring: tuple[int, int] = (3, 14)
+    blur: int = 2
     turns: int = 8
     most: tuple[float, float] = (0.01, 0.99)
     least_half: float = 0.002
@@ -85,7 +87,7 @@ class KinConfig:
     free_sigma: float = 0.003
     free_pull: float = 5.0
     pull: float = 0.03
-    size_deviation: float = 0.5
+    size_deviation: float = 0.35
     stretch_deviation: float = 0.25
     taper_deviation: float = 0.15
     lift_deviation: float = 0.004

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import binary_dilation
+from scipy.ndimage import binary_dilation, minimum_filter
 
 from brrp_cli.config import KinConfig, SensorConfig
 from brrp_cli.frames.frame import Frame
@@ -68,17 +68,21 @@ def gather(
         T_plane_cam[:3, 3].astype(np.float32),
         np.asarray(np.linalg.inv(T_plane_cam), dtype=np.float64),
         frame,
-        _told_depth(frame, object_id, config.ring[0]),
+        _told_depth(frame, object_id, config),
         float(depth_deviation(np.median(points[:, 2]), sensor)),
     )
 
 
-def _told_depth(frame: Frame, object_id: int, unsure: int) -> Floats:
-    """Depth (H, W), NaN at pixels of others within `unsure` pixels of the object's."""
+def _told_depth(frame: Frame, object_id: int, config: KinConfig) -> Floats:
+    """Depth (H, W), the nearest of all pixels within `config.blur`: space is free where all of them
+    say so. NaN at pixels of others within the ring of those that may be anyone's."""
     own = frame.segmap == object_id
-    depth: Floats = frame.points[..., 2].copy()
-    depth[binary_dilation(own, iterations=unsure) & ~own] = np.nan
-    return depth
+    measured = frame.points[..., 2]
+    known = np.where(np.isfinite(measured), measured, np.inf)
+    nearest = minimum_filter(known, size=2 * config.blur + 1)
+    depth = np.where(np.isfinite(measured) & np.isfinite(nearest), nearest, np.nan)
+    depth[binary_dilation(own, iterations=config.ring[0]) & ~own] = np.nan
+    return depth.astype(np.float32)
 
 
 def _free(
