@@ -23,13 +23,14 @@ class KinConfig:
     What was seen: `seen_points` observed points at most, merged in cells of `cell` metres, and
     `free_points` of free space, from `free_gap` metres in front of the measured depth on, a share
     `free_beside` of them in a ring of pixels about the silhouette, from the first of `ring` to the
-    second. Nearer to it a pixel may be anyone's. The surface
-    stands in free space where all pixels within `blur` pixels say so.
+    second. Nearer to it a pixel may be anyone's. A share `at_edge` of those lies as deep as the
+    silhouette's next pixel, with a standard deviation of `edge` times the size. The surface stands
+    in free space where all pixels within `blur` pixels say so.
     First tries: every pose in `turns` turns. Sizes follow from the extents of what was seen,
     between the shares `most` of the points, `least_half` at least; sizes whose mean logarithm is
     beyond `most_size`, or of which one is off the mean by more than `most_stretch`, are left out.
     They are held against `coarse_seen` observed and `coarse_free` free points, to `coarse_near`
-    metres. The best `starts` of them, `starts_each` of one object at most, take `steps`
+    metres. The best `starts` of them, at first `starts_each` of one object at most, take `steps`
     Gauss-Newton steps with `step_seen` and `step_free` points, damped by a share `damping`.
     `sigma`, `free_sigma` : metres, standard deviations of the distances of seen points and of free
     ones inside of the shape, which count `free_pull` times; `robust` : metres, from which on points
@@ -63,10 +64,12 @@ class KinConfig:
     surface_points: int = 400
     cell: float = 0.004
     seen_points: int = 400
-    free_points: int = 600
+    free_points: int = 1200
     free_gap: float = 0.008
     free_beside: float = share(0.6)
     ring: tuple[int, int] = (3, 14)
+    at_edge: float = share(0.7)
+    edge: float = 0.05
     blur: int = 2
     turns: int = 8
     most: tuple[float, float] = (0.01, 0.99)
@@ -80,7 +83,7 @@ class KinConfig:
     starts_each: int = 3
     steps: int = 8
     step_seen: int = 160
-    step_free: int = 120
+    step_free: int = 240
     damping: float = 0.02
     sigma: float = 0.003
     robust: float = 0.009
@@ -110,7 +113,7 @@ class KinConfig:
     solid_most: float = share(0.45)
     many_seen: int = 250
     least_seen: int = 40
-    least_share: float = share(0.03)
+    least_share: float = share(0.15)
     width: float = 0.001
     doubt: float = 0.015
     sure: float = share(0.95)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import binary_dilation, minimum_filter
+from scipy.ndimage import binary_dilation, distance_transform_edt, minimum_filter
 
 from brrp_cli.config import KinConfig, SensorConfig
 from brrp_cli.frames.frame import Frame
@@ -105,6 +105,9 @@ def _free(
     beside = binary_dilation(own, iterations=outer) & ~binary_dilation(own, iterations=inner)
     size = float(np.linalg.norm(np.ptp(points, axis=0)))
     low, high = float(points[:, 2].min()) - size / 4, float(points[:, 2].max()) + size / 2
+    told = own & np.isfinite(depth)
+    nearest = distance_transform_edt(~told, return_distances=False, return_indices=True)
+    at_edge = depth[tuple(nearest)].astype(np.float64)
     found = []
     for where, share in ((beside, config.free_beside), (own, 1 - config.free_beside)):
         at = np.flatnonzero((where & np.isfinite(depth)).ravel())
@@ -121,6 +124,10 @@ def _free(
         if where is own:
             # What is hollow shows in what lies just in front of its inside.
             z = end - (end - low) * rng.random(len(pixel)) ** 2
+        else:
+            # And where it ends, in what lies beside its edge, no nearer and no further.
+            edge = at_edge.ravel()[pixel] + config.edge * size * rng.standard_normal(len(pixel))
+            z = np.where(rng.random(len(pixel)) < config.at_edge, np.minimum(edge, end), z)
         x = (u + window[1].start - frame.K[0, 2]) / frame.K[0, 0]
         y = (v + window[0].start - frame.K[1, 2]) / frame.K[1, 1]
         found.append(np.stack([x * z, y * z, z], axis=1))

@@ -13,6 +13,7 @@ from threading import Lock
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import label
 from scipy.spatial import ConvexHull
 
 from brrp_cli.config import KinConfig
@@ -172,7 +173,7 @@ def library_of(shapes: Sequence[KinShape], config: KinConfig) -> Library:
     """The library of some shapes, one at least."""
     starts = np.cumsum([0, *(each.field.values.size for each in shapes)])
     fields = Fields(
-        np.concatenate([each.field.values.astype(np.float16).ravel() for each in shapes]),
+        np.concatenate([_filled(each.field.values).astype(np.float16).ravel() for each in shapes]),
         starts[:-1].astype(np.int64),
         np.array([each.field.values.shape for each in shapes], np.int32),
         np.array([each.field.lower for each in shapes], np.float32),
@@ -200,13 +201,27 @@ def library_of(shapes: Sequence[KinShape], config: KinConfig) -> Library:
     return replace(bare, coarse=_coarse(bare, config))
 
 
+def _filled(values: NDArray[np.floating]) -> NDArray[np.floating]:
+    """Distances (nx, ny, nz) of a shape whose closed hollows are solid: nobody sees into them, and
+    a bottle stored with its inside is no bowl."""
+    parts, count = label(values > 0)
+    if count < 2:
+        return values
+    border = np.ones(values.shape, bool)
+    border[1:-1, 1:-1, 1:-1] = False
+    closed = (values > 0) & ~np.isin(parts, np.unique(parts[border]))
+    return np.where(closed, -values, values)
+
+
 def _hollow(fields: Fields, surfaces: Sequence[Floats]) -> Floats:
     """(O,) of each shape: 0 of a convex one, about a half of a bowl."""
     found = np.empty(len(surfaces), np.float32)
     for number, surface in enumerate(surfaces):
-        # The points are in random order.
-        half = len(surface) // 2
-        middle = ((surface[:half] + surface[half : 2 * half]) / 2).astype(np.float32)
+        distance, _ = fields.distance_and_gradient(np.array([number]), surface.T[:, None])
+        # In random order. Those deep inside belong to what is closed.
+        outer = surface[distance[0] > -CLEAR]
+        half = len(outer) // 2
+        middle = ((outer[:half] + outer[half : 2 * half]) / 2).astype(np.float32)
         distance, _ = fields.distance_and_gradient(np.array([number]), middle.T[:, None])
         found[number] = (distance > CLEAR).mean()
     return found

@@ -70,14 +70,14 @@ def starts(evidence: Evidence, library: Library, config: KinConfig) -> Placement
     order = np.argsort(-score, kind="stable")
     shape = library.object[every.stance[order]]
     taken: dict[int, int] = {}
-    kept = []
+    first, others = [], []
     for row, number in zip(order, shape, strict=True):
-        if taken.get(int(number), 0) < config.starts_each:
-            taken[int(number)] = taken.get(int(number), 0) + 1
-            kept.append(row)
-        if len(kept) == config.starts:
+        taken[int(number)] = taken.get(int(number), 0) + 1
+        (first if taken[int(number)] <= config.starts_each else others).append(row)
+        if len(first) == config.starts:
             break
-    return every[np.array(kept, np.int64)]
+    # Where the shapes are few, each gets more.
+    return every[np.array([*first, *others][: config.starts], np.int64)]
 
 
 def _score(

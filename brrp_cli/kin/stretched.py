@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
 
 from brrp_cli.config import KinConfig
 from brrp_cli.geometry import similarity
@@ -25,7 +27,8 @@ def stretched(
     """
     stance = placements.stance[row]
     inverse = np.linalg.inv(library.to_object[stance].astype(np.float64))
-    u = (stored.vertices - library.origin[stance]) @ inverse.T
+    outer, faces = largest_piece(stored)
+    u = (stored.vertices[outer] - library.origin[stance]) @ inverse.T
     at_rest = Placements(
         placements.stance[[row]],
         np.zeros(1, np.float32),
@@ -46,10 +49,26 @@ def stretched(
     values = np.clip(distance[0], -longest, longest).reshape(tuple(shape))
     return StoredShape(
         vertices.astype(np.float32),
-        stored.faces,
-        stored.colours,
+        faces,
+        stored.colours[outer],
         DistanceField(lower, spacing, values.astype(np.float32)),
     )
+
+
+def largest_piece(
+    stored: StoredShape,
+) -> tuple[NDArray[np.int64], NDArray[np.int32]]:
+    """Rows (w,) of the vertices of the widest connected piece of a mesh, and its faces (m, 3) over
+    these: an object is one piece, and what lies inside of it is not seen."""
+    count = len(stored.vertices)
+    edges = np.concatenate([stored.faces[:, [0, 1]], stored.faces[:, [1, 2]]])
+    graph = coo_matrix((np.ones(len(edges), bool), edges.T), shape=(count, count))
+    pieces, of = connected_components(graph, directed=False)
+    width = [np.ptp(stored.vertices[of == piece], axis=0).sum() for piece in range(pieces)]
+    kept = of == int(np.argmax(width))
+    number = np.cumsum(kept) - 1
+    faces = number[stored.faces[kept[stored.faces[:, 0]]]]
+    return np.flatnonzero(kept), faces.astype(np.int32)
 
 
 def pose(placements: Placements, row: int) -> Array:
