@@ -70,10 +70,11 @@ def starts(evidence: Evidence, library: Library, config: KinConfig) -> Placement
     order = np.argsort(-score, kind="stable")
     shape = library.object[every.stance[order]]
     taken: dict[int, int] = {}
-    first, others = [], []
+    first: list[int] = []
+    others: list[int] = []
     for row, number in zip(order, shape, strict=True):
         taken[int(number)] = taken.get(int(number), 0) + 1
-        (first if taken[int(number)] <= config.starts_each else others).append(row)
+        (first if taken[int(number)] <= config.starts_each else others).append(int(row))
         if len(first) == config.starts:
             break
     # Where the shapes are few, each gets more.
