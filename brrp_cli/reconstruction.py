@@ -142,8 +142,8 @@ class Outcome:
     """What an object was taken for.
 
     name : the stored object; None = none of them, or nothing is known
-    how : "recognised", "not in the prior", "retrieved" (a method that weighs no placements), or ""
-        (one without a prior)
+    how : "recognised", "similar" (it has that object's shape, stretched), "not in the prior",
+        "retrieved" (a method that weighs no placements), or "" (one without a prior)
     weight : of that in the posterior, or the probability of what was retrieved
     size_factor : of a recognised object, over its stored size
     """
@@ -152,6 +152,26 @@ class Outcome:
     how: str
     weight: float | None
     size_factor: float | None
+
+    @property
+    def told(self) -> str:
+        """In a word or two."""
+        if self.name is None:
+            return self.how
+        return f"like {self.name}" if self.how == "similar" else self.name
+
+
+@dataclass(frozen=True)
+class Similar:
+    """A stored object that an object which is none of them is like.
+
+    scales : (3,) of its shape over the stored one, along the axes of its box as it rests, the last
+    upright; weight : in the posterior, a part of that of "none of them"
+    """
+
+    name: str
+    weight: float
+    scales: tuple[float, float, float]
 
 
 @dataclass(repr=False)
@@ -164,6 +184,7 @@ class ObjectReconstruction:
     message : for people; may also qualify an "ok"
     n_points : valid observed points; observed : (n, 3) those points, metres, camera frame;
     center : (3,) centre of their bounding box
+    similar : what it is like, should it be none of them, heaviest first
     unknown_weight : of that in the posterior; None where it has none
     posterior, surface : None unless the object got that far
     unknown_probability : that the prior does not hold the object; 0 where retrieval cannot tell
@@ -177,6 +198,7 @@ class ObjectReconstruction:
     center: NDArray[np.float64] | None = None
     observed: NDArray[np.float32] | None = None
     retrieved: list[Retrieved] = field(default_factory=list)
+    similar: list[Similar] = field(default_factory=list)
     unknown_probability: float = 0.0
     unknown_weight: float | None = None
     posterior: StoredPosterior | None = None
@@ -196,12 +218,21 @@ class ObjectReconstruction:
         found = self.recognised
         if found is not None:
             return Outcome(found.name, "recognised", found.weight, found.size_factor)
+        if self.like is not None:
+            weight = sum(each.weight for each in self.similar)
+            return Outcome(self.like.name, "similar", weight, None)
         if self.unknown_weight is not None:
             return Outcome(None, "not in the prior", self.unknown_weight, None)
         if self.retrieved:
             best = self.retrieved[0]
             return Outcome(best.name, "retrieved", best.probability, None)
         return Outcome(None, "", None, None)
+
+    @property
+    def like(self) -> Similar | None:
+        """The stored object whose stretched shape this one's is; None where what it is like does
+        not weigh more than a half."""
+        return self.similar[0] if sum(each.weight for each in self.similar) > 0.5 else None
 
     @property
     def mean_uncertainty(self) -> float | None:
@@ -216,7 +247,7 @@ class ObjectReconstruction:
         status = self.status + (f": {self.message}" if self.message else "")
         return (
             str(self.object_id),
-            outcome.name or outcome.how or "-",
+            outcome.told or "-",
             "-" if outcome.weight is None else f"{outcome.weight:.2f}",
             "-" if outcome.size_factor is None else f"{outcome.size_factor:.2f}",
             "-" if spread is None else f"{spread * 1000:.1f}",

@@ -137,6 +137,8 @@ def _row(each: Told) -> tuple[str, ...]:
     name = each.taken_for or each.how or "-"
     if each.how == "retrieved":
         name += " (retrieved)"
+    if each.how == "similar":
+        name = f"like {name}"
     # Of a failure the log has told the rest.
     said = each.message.split("\n")[0]
     status = [] if each.status == OK else [each.status]

@@ -12,6 +12,7 @@ from typing import Any
 
 from brrp_cli.config.baselines import CoarseToFineConfig, PointSDFConfig, VPrismConfig
 from brrp_cli.config.inference import CompletionConfig, FittedMapConfig, InferenceConfig, MeanConfig
+from brrp_cli.config.kin import KinConfig
 from brrp_cli.config.observation import ObservationConfig, SensorConfig
 from brrp_cli.config.registration import (
     ColourConfig,
@@ -37,6 +38,7 @@ __all__ = [
     "FittedMapConfig",
     "HypothesesConfig",
     "InferenceConfig",
+    "KinConfig",
     "LikelihoodConfig",
     "MeanConfig",
     "ObservationConfig",
@@ -64,6 +66,7 @@ class HypothesesConfig:
     weigh: WeighConfig = field(default_factory=WeighConfig)
     mean: MeanConfig = field(default_factory=MeanConfig)
     completion: CompletionConfig = field(default_factory=CompletionConfig)
+    kin: KinConfig = field(default_factory=KinConfig)
     map: FittedMapConfig = field(default_factory=FittedMapConfig)
     sensor: SensorConfig = field(default_factory=SensorConfig)
 

@@ -80,21 +80,21 @@ class HypothesisPosterior:
     @property
     def dominant(self) -> int | None:
         """The placed shape that explains the object: the most probable placement, if placements of
-        its object together weigh more than a half."""
+        its object together weigh more than a half, or those of all kin."""
         of: dict[str, float] = {}
         for mean, weight in zip(self.means, self.weights, strict=True):
             if isinstance(mean, PlacedShape):
-                of[mean.name] = of.get(mean.name, 0.0) + float(weight)
+                of[mean.taken_for] = of.get(mean.taken_for, 0.0) + float(weight)
         best = max(of, key=lambda name: of[name], default=None)
         if best is None or of[best] <= 0.5:
             return None
-        mine = [isinstance(m, PlacedShape) and m.name == best for m in self.means]
+        mine = [isinstance(m, PlacedShape) and m.taken_for == best for m in self.means]
         return int(np.argmax(np.where(mine, self.weights, -1)))
 
     def object_weight(self, number: int) -> float:
-        """Weight of all placements of the object that hypothesis `number` places."""
-        name = getattr(self.means[number], "name", None)
-        mine = [isinstance(m, PlacedShape) and m.name == name for m in self.means]
+        """Weight of all placements of the object that hypothesis `number` places, or of all kin."""
+        name = getattr(self.means[number], "taken_for", None)
+        mine = [isinstance(m, PlacedShape) and m.taken_for == name for m in self.means]
         return float(self.weights[mine].sum())
 
     def logits(self, points: NDArray[np.floating]) -> NDArray[np.float32]:

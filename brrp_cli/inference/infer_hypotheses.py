@@ -110,13 +110,15 @@ def _counted(
     placement has been fitted to them, and behind a thin wall they would be taken for its inside.
     And `contradiction` for what lies further inside of it than that, and was seen there or seen to
     be free. Not for what was seen outside of it: masks reach beyond objects more often than objects
-    beyond their shapes.
+    beyond their shapes. Nor for kin, which are off by more than the noise in any case.
     """
     counted = np.ones(len(samples.points), np.float32)
     if isinstance(mean, PlacedShape):
         measured = np.isfinite(samples.measured[:, 0])
         seen, free = np.flatnonzero(measured), np.flatnonzero(~measured & (logits > 0))
         distance = mean.signed_distance(samples.measured[seen], noise)
+        if mean.kin:
+            contradiction = 1.0
         counted[seen] = np.where(distance < -noise, contradiction, distance > noise)
         deep = mean.signed_distance(samples.points[free], noise) < -noise
         counted[free[deep]] = contradiction

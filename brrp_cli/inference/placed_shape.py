@@ -34,6 +34,9 @@ class PlacedShape:
     (metres), in the camera's axes: how well the frame fixes the placement
     T_cam_shape : (4, 4) similarity from the shape's coordinates; width : metres, scale of the
     logistic function across the surface; limit : of the logit
+    kin : whether the shape was stretched to fit an object that is not the stored one but like it
+    exact : metres from the surface within which distances are, 0: nowhere; None: where the logit is
+    not at its limit
     """
 
     kind: ClassVar[str] = "shape"
@@ -44,6 +47,14 @@ class PlacedShape:
     width: float
     limit: float
     covariance: Array
+    kin: bool = False
+    exact: float | None = None
+
+    @property
+    def taken_for(self) -> str:
+        """What the object is, if this is its shape: the stored object of that name, or none of
+        them, "" for all kin."""
+        return "" if self.kin else self.name
 
     @property
     def unit(self) -> float:
@@ -82,7 +93,12 @@ class PlacedShape:
 
     def logits(self, points: NDArray[np.floating]) -> NDArray[np.float32]:
         """m (n,) at points (n, 3), metres, camera frame."""
-        distance = self.signed_distance(points, self.limit * self.width)
+        if self.exact == 0:
+            local = transform_points(np.linalg.inv(self.T_cam_shape), np.asarray(points))
+            distance = self.shape.field.signed_distance(local) * self.unit
+        else:
+            band = self.limit * self.width if self.exact is None else self.exact
+            distance = self.signed_distance(points, band)
         limited = np.clip(-distance / self.width, -self.limit, self.limit)
         return np.asarray(limited, dtype=np.float32)
 
@@ -92,11 +108,15 @@ class PlacedShape:
         return self.logits(nodes.reshape(-1, 3)).reshape(nodes.shape[:3])
 
     def write(self, group: h5py.Group, shared: SharedParts) -> None:
-        """Attributes name, T_cam_shape (4, 4), width, limit, covariance (6, 6), and shape, the name
-        of the stored shape among what the file's objects share."""
+        """Attributes name, T_cam_shape (4, 4), width, limit, covariance (6, 6), kin and exact
+        where they apply, and shape, the name of the shape among what the file's objects share."""
         group.attrs.update({"name": self.name, "T_cam_shape": self.T_cam_shape})
         group.attrs.update({"width": self.width, "limit": self.limit})
         group.attrs["covariance"] = self.covariance
+        if self.kin:
+            group.attrs["kin"] = True
+        if self.exact is not None:
+            group.attrs["exact"] = self.exact
         group.attrs["shape"] = shared.write("shape", self.shape, _write_shape)
 
     @classmethod
@@ -109,6 +129,8 @@ class PlacedShape:
             float(group.attrs["width"]),
             float(group.attrs["limit"]),
             np.asarray(group.attrs["covariance"], dtype=np.float64),
+            bool(group.attrs.get("kin", False)),
+            float(group.attrs["exact"]) if "exact" in group.attrs else None,
         )
 
 

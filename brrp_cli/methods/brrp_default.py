@@ -17,13 +17,14 @@ from brrp_cli.inference.infer_hypotheses import Problem, infer_correction
 from brrp_cli.inference.mean_grid import MeanGrid, grid_over
 from brrp_cli.inference.placed_shape import PlacedShape
 from brrp_cli.inference.posterior import LOGISTIC_DEVIATION
+from brrp_cli.methods.kin_hypotheses import KinHypothesis, kin_hypotheses
 from brrp_cli.observation.pixel_noise import PixelNoise
 from brrp_cli.observation.ray_samples import ObjectObservation
 from brrp_cli.observation.sensor_noise import depth_deviation
 from brrp_cli.observation.soft_samples import soft_samples
 from brrp_cli.observation.support_plane import Plane
 from brrp_cli.prior.store import Prior
-from brrp_cli.reconstruction import OK, ObjectReconstruction, Retrieved
+from brrp_cli.reconstruction import OK, ObjectReconstruction, Retrieved, Similar
 from brrp_cli.registration.likelihood import evidence, log_likelihood, see
 from brrp_cli.registration.model import search_model
 from brrp_cli.registration.pose_covariance import pose_covariance
@@ -87,17 +88,30 @@ def reconstruct_by_hypotheses(
         shares = [p for (_, p), group in zip(chosen, found, strict=True) for _ in group]
         ratios = _log_likelihoods(placed, frame, object_id, plane, noise, hypotheses)
         weights = weigh(shares, ratios, missing, hypotheses.weigh)
-        kept = _kept(weights, hypotheses.map)
+        like: list[KinHypothesis] = []
+        if weights[-1] >= hypotheses.kin.least_unknown:
+            like = kin_hypotheses(
+                observation.points, frame, object_id, plane, prior, hypotheses, seed
+            )
+    with timed(seconds, "inference"):
+        shared = _shared_with_kin(weights, like)
+        kept = _kept(shared, hypotheses.map)
         for i in kept[kept < len(placed)]:
             placed[i] = _refined(placed[i], verifier, wave, hypotheses)
-    with timed(seconds, "inference"):
+        shapes = [
+            _placed_shape(placed[i], observation.points, wave, hypotheses)
+            if i < len(placed)
+            else like[i - len(placed)].shape
+            for i in kept
+            if i < len(placed) + len(like)
+        ]
         posterior = _infer(
             observation,
             frame,
             plane,
             wave,
-            [placed[i] for i in kept if i < len(placed)],
-            weights[kept] / weights[kept].sum(),
+            shapes,
+            shared[kept] / shared[kept].sum(),
             hypotheses,
             seed=seed,
             device=device,
@@ -112,6 +126,9 @@ def reconstruct_by_hypotheses(
         retrieved=[
             _retrieved(name, probability, placed[a:b], float(weights[a:b].sum()))
             for (name, probability), a, b in zip(chosen, ends[:-1], ends[1:], strict=True)
+        ],
+        similar=[
+            Similar(each.shape.name, float(weights[-1]) * each.share, each.scales) for each in like
         ],
         unknown_probability=missing,
         unknown_weight=float(weights[-1]),
@@ -169,15 +186,14 @@ def _infer(
     frame: Frame,
     plane: Plane | None,
     wave: float,
-    placed: list[Hypothesis],
+    shapes: list[PlacedShape],
     weights: Array,
     config: HypothesesConfig,
     *,
     seed: int,
     device: str,
 ) -> HypothesisPosterior:
-    """weights : of what was placed and, where there is one more, of "none of them"."""
-    shapes = [_placed_shape(each, observation.points, wave, config) for each in placed]
+    """weights : of the shapes and, where there is one more, of the completion."""
     part = None
     if len(shapes) < len(weights):
         part = visible_part(
@@ -202,6 +218,13 @@ def _infer(
         seed=child_seed(seed, observation.object_id),
         device=device,
     )
+
+
+def _shared_with_kin(weights: Array, like: list[KinHypothesis]) -> Array:
+    """Weights of what was placed, of kin, and of the completion: kin take from "none of them"."""
+    none = weights[-1]
+    shares = [none * each.share for each in like]
+    return np.array([*weights[:-1], *shares, none - sum(shares)])
 
 
 def _kept(weights: Array, config: FittedMapConfig) -> NDArray[np.int64]:

@@ -34,7 +34,7 @@ import hashlib
 import json
 import math
 import zlib
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -231,6 +231,14 @@ def read_appearance(file: h5py.File, name: str) -> Appearance:
         if key.startswith(f"{APPEARANCE}/")
     }
     return Appearance(**arrays)
+
+
+def read_parts(file: h5py.File, name: str, keys: Sequence[str]) -> dict[str, NDArray[Any]]:
+    """Read some of one object's arrays, with all checks but the checksum of the whole object."""
+    where = f"{file.filename}, {name}"
+    reading = _Reading(where)
+    group = _hard(file, f"objects/{name}", where)
+    return {key: _read_array(group, key, *ARRAYS[key], reading) for key in keys}
 
 
 def _hard(group: h5py.Group, key: str, where: str) -> Any:

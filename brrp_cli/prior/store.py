@@ -4,11 +4,15 @@ from __future__ import annotations
 
 import hashlib
 from collections import OrderedDict, defaultdict
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from itertools import groupby
 from pathlib import Path
 from threading import Lock
 from typing import Any
+
+from numpy.typing import NDArray
 
 from brrp_cli.errors import BrrpError, PriorError
 from brrp_cli.files import sha256_file
@@ -25,7 +29,7 @@ from brrp_cli.prior.manifest import (
 )
 from brrp_cli.prior.objects import PriorObject
 from brrp_cli.prior.pack import unpack
-from brrp_cli.prior.shard import damaged, object_names, open_shard, read_stored
+from brrp_cli.prior.shard import damaged, object_names, open_shard, read_parts, read_stored
 
 # Objects that are held in memory once they were read, about 2 MB each.
 HELD = 64
@@ -100,12 +104,31 @@ class Prior:
                 self._held.popitem(last=False)
             return found
 
-    def _read(self, name: str) -> PriorObject:
-        row = self.index.rows[name]
-        shard = self.index.shards[self.index.shard_of[row]]
+    def parts(
+        self, names: Sequence[str], keys: Sequence[str]
+    ) -> Iterator[tuple[str, dict[str, NDArray[Any]]]]:
+        """Some arrays (shard.py names them) of some objects, shard by shard; they are not held.
+        Errors: KeyError for an unknown name, PriorError for a bad shard."""
+        by_shard = sorted(names, key=lambda name: self.index.shard_of[self.index.rows[name]])
+        for number, group in groupby(
+            by_shard, lambda name: self.index.shard_of[self.index.rows[name]]
+        ):
+            shard = self.index.shards[number]
+            with self._reading:
+                self._check(shard)
+            with open_shard(self.path / shard.file) as file:
+                for name in group:
+                    yield name, read_parts(file, name, keys)
+
+    def _check(self, shard: ShardEntry) -> None:
         if shard.file not in self._checked:
             check_bytes(self.path, shard)
             self._checked.add(shard.file)
+
+    def _read(self, name: str) -> PriorObject:
+        row = self.index.rows[name]
+        shard = self.index.shards[self.index.shard_of[row]]
+        self._check(shard)
         with open_shard(self.path / shard.file) as file:
             return unpack(read_stored(file, name), self.phrases[row])
 

@@ -4,6 +4,7 @@ frame that it is of."""
 from __future__ import annotations
 
 import json
+from dataclasses import asdict
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -180,6 +181,8 @@ def _object_record(item: ObjectReconstruction, T_target_cam: NDArray[np.float64]
         "mesh": None if item.surface is None else mesh_name(item.object_id),
         **({} if item.surface is None else _surface_record(item.surface, T_target_cam)),
         "recognised": None if item.recognised is None else item.recognised.name,
+        "like": None if item.like is None else item.like.name,
+        "similar": [asdict(each) for each in item.similar],
         "not_in_prior": item.unknown_probability,
         "weight_not_in_prior": item.unknown_weight,
         "retrieved": [_retrieved_record(r, T_target_cam) for r in item.retrieved],

@@ -133,7 +133,9 @@ def _around_stored_mesh(
     empty: Empty | None,
 ) -> ConfidenceSurface | None:
     """The same around a recognised object's mesh; None where the frame contradicts the stored
-    shape."""
+    shape, and of kin, whose shape is in doubt."""
+    if placed(posterior, number).kin:
+        return None
     through = along_normals(posterior, number, config)
     best = moved_to_level(through, config.level, through.own)
     if best.off > config.most_off:

@@ -40,20 +40,26 @@ def extract_surface(
     if the posterior is not finite, or wider than any object.
     """
     if isinstance(posterior, HypothesisPosterior) and posterior.dominant is not None:
+        explained = placed(posterior, posterior.dominant)
         through = along_normals(posterior, posterior.dominant, config)
         # Other placements of the object, its handle elsewhere, say how sure this one is; a surface
         # between them would be that of nothing.
-        moved = moved_to_level(through, config.level, through.own)
+        moved = moved_to_level(through, config.level, through.own, stay=explained.kin)
         deviation = moved_to_level(through, config.level).deviation
+        if explained.kin:
+            # Walls of several kin that miss each other have no surface in common.
+            most = np.hypot(moved.deviation, 2 * config.farthest).astype(np.float32)
+            deviation = np.minimum(deviation, most)
         check_finite("The surface", vertices=moved.vertices, uncertainty=deviation)
-        if moved.off <= config.most_off:
-            shape = placed(posterior, posterior.dominant).shape
+        # Kin are off by more; a grid would lose their walls, and what they are taken for.
+        if explained.kin or moved.off <= config.most_off:
             return Surface(
                 moved.vertices,
-                shape.faces.astype(np.int64),
+                explained.shape.faces.astype(np.int64),
                 deviation,
                 posterior.surface_unit,
-                shape.colours,
+                # What is only like a stored object has the colours of the image.
+                None if explained.kin else explained.shape.colours,
             )
     spacing = grid_spacing(posterior.bounds, config)
     axes = grid_axes(posterior.bounds, spacing)

@@ -92,10 +92,15 @@ def placed(posterior: HypothesisPosterior, number: int) -> PlacedShape:
 
 
 def moved_to_level(
-    through: AlongNormals, level: float, occupancy_along: NDArray[np.float32] | None = None
+    through: AlongNormals,
+    level: float,
+    occupancy_along: NDArray[np.float32] | None = None,
+    *,
+    stay: bool = False,
 ) -> Moved:
     """Each vertex where occupancy, by default the mean over all particles, falls through `level`,
-    next to where it was; at the end of the way that comes nearest to it where it does not."""
+    next to where it was; where it does not, at the end of the way that comes nearest to it, or,
+    with `stay`, where it was."""
     above = (through.mean if occupancy_along is None else occupancy_along) - level
     falls = (above[:-1] >= 0) & (above[1:] < 0)
     middle = np.abs(through.way[:-1] + through.way[1:])
@@ -107,6 +112,7 @@ def moved_to_level(
     crossed = np.any(falls, axis=0)
     outside = above[len(above) // 2] < 0
     ends = np.where(outside, through.way[0], through.way[-1])
+    ends = np.where(stay, 0.0, ends)
     offset = np.where(crossed, start + (end - start) * before / gap, ends)
     steepness = np.where(crossed, gap / np.maximum(end - start, 1e-9), 0.0)
     return Moved(

@@ -1,0 +1,122 @@
+"""Fitted kin: stored shapes, stretched, for objects that the prior does not hold. Lengths are
+metres."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from brrp_cli.config.ranges import share
+
+
+@dataclass(frozen=True)
+class KinConfig:
+    """Stored shapes with a scale of their own on each axis, stretched onto what was seen of an
+    object that may be none of the stored ones (brrp_cli/kin).
+
+    enabled : whether it is done; least_unknown : weight of "none of the stored objects" from which
+    on it is done
+
+    The shapes: of `objects` objects at most, evenly over the prior's names, in their `poses` most
+    probable resting poses with a probability of `least_pose` or more. Coarse distances are kept at
+    `nodes` nodes along each axis of the box, which they reach over by the factor `reach`;
+    `surface_points` of the surface stand for it.
+    What was seen: `seen_points` observed points at most, merged in cells of `cell` metres, and
+    `free_points` of free space, from `free_gap` metres in front of the measured depth on, a share
+    `free_beside` of them in a ring of pixels about the silhouette, from the first of `ring` to the
+    second. Nearer to it a pixel may be anyone's. A share `at_edge` of those lies as deep as the
+    silhouette's next pixel, with a standard deviation of `edge` times the size. The surface stands
+    in free space where all pixels within `blur` pixels say so.
+    First tries: every pose in `turns` turns. Sizes follow from the extents of what was seen,
+    between the shares `most` of the points, `least_half` at least; sizes whose mean logarithm is
+    beyond `most_size`, or of which one is off the mean by more than `most_stretch`, are left out.
+    They are held against `coarse_seen` observed and `coarse_free` free points, to `coarse_near`
+    metres. The best `starts` of them, at first `starts_each` of one object at most, take `steps`
+    Gauss-Newton steps with `step_seen` and `step_free` points, damped by a share `damping`.
+    `sigma`, `free_sigma` : metres, standard deviations of the distances of seen points and of free
+    ones inside of the shape, which count `free_pull` times; `robust` : metres, from which on points
+    pull less (Geman and McClure); `pull` : weight of the prior, by which logarithms of sizes have
+    the standard deviation `size_deviation`, their differences `stretch_deviation`, the taper
+    `taper_deviation`, and the underside `lift_deviation` metres about the plane.
+    Scores: `near` : metres, with the sensor's noise the standard deviation of the Gaussian of
+    observed points' distances; `far` : one further away counts as this far; `violation_weight` : of
+    the share of the surface that stands in free space or below the plane, from `tolerance` metres
+    on and fully from `tolerance + slope`; `free_weight` : of free points within; `lost_weight` : of
+    observed points further than `lost` metres away. All points move the best `kept` fits once more.
+    Hypotheses: of the best `kept` fits the best `hypotheses` that lie `distinct` metres apart, at
+    every `distinct_step`-th point. Their weight is a logistic function of the best score, a half at
+    `convincing`, with the slope `sharpness`; of a shape whose share of hollow space reaches from
+    the first to the second of `hollow`, a half by up to `hollow_bonus` earlier, and one that is
+    solid weighs `solid_most` at most: of solids the completion is as good, and their mean is better
+    than either; and less where fewer than `many_seen` cells were seen, none below `least_seen`;
+    what weighs less than `least_share` is left out. The logit is the distance over `width` metres,
+    which grows by `doubt` for each unit that the mean Gaussian falls short of `sure`, and of hollow
+    shapes is exact to `exact` metres; distances are kept on `field_nodes` nodes up to `margin`
+    metres around.
+    """
+
+    enabled: bool = True
+    least_unknown: float = share(0.05)
+    objects: int = 400
+    poses: int = 4
+    least_pose: float = share(0.04)
+    nodes: int = 16
+    reach: float = 1.3
+    surface_points: int = 400
+    cell: float = 0.004
+    seen_points: int = 400
+    free_points: int = 1200
+    free_gap: float = 0.008
+    free_beside: float = share(0.6)
+    ring: tuple[int, int] = (3, 14)
+    at_edge: float = share(0.7)
+    edge: float = 0.05
+    blur: int = 2
+    turns: int = 8
+    most: tuple[float, float] = (0.01, 0.99)
+    least_half: float = 0.002
+    most_size: float = 1.2
+    most_stretch: float = 0.9
+    coarse_seen: int = 80
+    coarse_free: int = 60
+    coarse_near: float = 0.006
+    starts: int = 48
+    starts_each: int = 3
+    steps: int = 8
+    step_seen: int = 160
+    step_free: int = 240
+    damping: float = 0.02
+    sigma: float = 0.003
+    robust: float = 0.009
+    free_sigma: float = 0.003
+    free_pull: float = 5.0
+    pull: float = 0.03
+    size_deviation: float = 0.35
+    stretch_deviation: float = 0.25
+    taper_deviation: float = 0.15
+    lift_deviation: float = 0.004
+    near: float = 0.002
+    far: float = 0.015
+    violation_weight: float = 3.0
+    tolerance: float = 0.004
+    slope: float = 0.008
+    free_weight: float = 1.0
+    lost: float = 0.008
+    lost_weight: float = 1.0
+    kept: int = 8
+    hypotheses: int = 3
+    distinct: float = 0.0015
+    distinct_step: int = 4
+    convincing: float = 0.42
+    sharpness: float = 16.0
+    hollow: tuple[float, float] = (0.4, 0.55)
+    hollow_bonus: float = 0.3
+    solid_most: float = share(0.45)
+    many_seen: int = 250
+    least_seen: int = 40
+    least_share: float = share(0.15)
+    width: float = 0.001
+    doubt: float = 0.015
+    sure: float = share(0.95)
+    exact: float = 0.002
+    margin: float = 0.015
+    field_nodes: int = 60_000

@@ -1,0 +1,1 @@
+"""Stored shapes, stretched, as what an object may be that the prior does not hold."""

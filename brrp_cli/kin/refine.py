@@ -1,0 +1,110 @@
+"""Few damped Gauss-Newton steps that bring many stretched shapes onto what was seen, out of what
+was seen to be free, and back to their own proportions where nothing speaks against it."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brrp_cli.config import KinConfig
+from brrp_cli.kin.evidence import Evidence
+from brrp_cli.kin.library import Library
+from brrp_cli.kin.placement import Placements, distance_and_slopes
+
+Floats = NDArray[np.float32]
+Array = NDArray[np.float64]
+
+# Turn, middle (3), logarithms of half (3), taper.
+UNKNOWNS = 8
+# A step of each at most: radians, metres, logarithms, a share.
+LARGEST = np.array([0.35, *[0.03] * 3, *[0.3] * 3, 0.15])
+# A cone to its tip has 1.
+MOST_TAPER = 0.6
+
+
+def refined(
+    placements: Placements, evidence: Evidence, library: Library, config: KinConfig
+) -> Placements:
+    """Each placement after `config.steps` steps over turn, middle, the three scales and taper."""
+    seen, free = evidence.seen[: config.step_seen], evidence.free[: config.step_free]
+    points = np.concatenate([seen, free])
+    for _ in range(config.steps):
+        distance, u, slope, across = distance_and_slopes(placements, points, library)
+        rows = _jacobian(placements, u, slope, across)
+        weight = _weights(distance, len(seen), config)
+        residual = distance.astype(np.float64)
+        # A point of free space asks the surface to be no nearer than its own side of it.
+        residual[:, len(seen) :] = np.minimum(residual[:, len(seen) :], 0)
+        by_fit = rows.transpose(1, 0, 2)
+        H = (by_fit * weight[:, None]) @ by_fit.transpose(0, 2, 1)
+        g = (by_fit @ (weight * residual)[..., None])[..., 0]
+        prior_H, prior_g = _prior(placements, library, config)
+        H += prior_H
+        g += prior_g
+        H[:, range(UNKNOWNS), range(UNKNOWNS)] *= 1 + config.damping
+        step = -np.asarray(np.linalg.solve(H, g[..., None])[..., 0], dtype=np.float64)
+        placements = _moved(placements, step)
+    return placements
+
+
+def _jacobian(placements: Placements, u: Floats, slope: Floats, across: Floats) -> Array:
+    """Rows (8, B, n): of the distance along each unknown."""
+    c, s = np.cos(placements.turn)[:, None], np.sin(placements.turn)[:, None]
+    half = placements.half.T[:, :, None]
+    wide = placements.widened(u[2])
+    x, y, z = across
+    sideways = slope[0] * u[0], slope[1] * u[1]
+    rows = [
+        (x * u[1] * half[1] - y * u[0] * half[0]) * wide,
+        s * y - c * x,
+        -s * x - c * y,
+        -z,
+        -sideways[0],
+        -sideways[1],
+        -u[2] * half[2] * z,
+        -(sideways[0] + sideways[1]) * np.clip(u[2], -1, 1) / wide,
+    ]
+    return np.stack(rows).astype(np.float64)
+
+
+def _weights(distance: Floats, seen: int, config: KinConfig) -> Array:
+    """Geman and McClure's for seen points; free ones that are inside count fully."""
+    weight = np.empty(distance.shape, np.float64)
+    on, at = distance[:, :seen], distance[:, seen:]
+    weight[:, :seen] = (1 / (1 + (on / config.robust) ** 2)) ** 2 / config.sigma**2 / max(seen, 1)
+    weight[:, seen:] = config.free_pull * (at < 0) / config.free_sigma**2 / max(at.shape[1], 1)
+    return weight
+
+
+def _prior(placements: Placements, library: Library, config: KinConfig) -> tuple[Array, Array]:
+    """Hessian (B, 8, 8) and gradient (B, 8) of sizes, stretches, taper and the underside."""
+    count = len(placements)
+    log = np.log(placements.half / library.half[placements.stance]).astype(np.float64)
+    H, g = np.zeros((count, UNKNOWNS, UNKNOWNS)), np.zeros((count, UNKNOWNS))
+    mean, spread = np.full((3, 3), 1 / 3), np.eye(3) - 1 / 3
+    metric = (
+        mean / 3 / config.size_deviation**2 + spread / config.stretch_deviation**2
+    ) * config.pull
+    H[:, 4:7, 4:7] += metric
+    g[:, 4:7] += log @ metric
+    taper = config.pull / config.taper_deviation**2
+    H[:, 7, 7] += taper
+    g[:, 7] += taper * placements.taper
+    # Underside: middle_z - half_z.
+    row = np.zeros((count, UNKNOWNS))
+    row[:, 3], row[:, 6] = 1, -placements.half[:, 2]
+    lift = (placements.middle[:, 2] - placements.half[:, 2]).astype(np.float64)
+    H += config.pull * row[:, :, None] * row[:, None] / config.lift_deviation**2
+    g += config.pull * row * lift[:, None] / config.lift_deviation**2
+    return H, g
+
+
+def _moved(placements: Placements, step: Array) -> Placements:
+    step = np.clip(step, -LARGEST, LARGEST)
+    return Placements(
+        placements.stance,
+        (placements.turn + step[:, 0]).astype(np.float32),
+        (placements.middle + step[:, 1:4]).astype(np.float32),
+        (placements.half * np.exp(step[:, 4:7])).astype(np.float32),
+        np.clip(placements.taper + step[:, 7], -MOST_TAPER, MOST_TAPER).astype(np.float32),
+    )

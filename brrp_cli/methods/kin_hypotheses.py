@@ -1,0 +1,140 @@
+"""Hypotheses that an object which the prior does not hold is like a stored one: fitted kin."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import expit
+
+from brrp_cli.config import HypothesesConfig, KinConfig
+from brrp_cli.frames.frame import Frame
+from brrp_cli.inference.placed_shape import PlacedShape
+from brrp_cli.kin.evidence import Evidence, gather
+from brrp_cli.kin.fit import Fits, fit_kin
+from brrp_cli.kin.library import Library, kin_library
+from brrp_cli.kin.placement import distance_and_slopes
+from brrp_cli.kin.stretched import pose, stretched
+from brrp_cli.observation.support_plane import Plane
+from brrp_cli.prior.store import Prior
+from brrp_cli.seeds import child_rng
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class KinHypothesis:
+    """share : of the weight of "none of the stored objects"; scales : (3,) over the stored shape,
+    along the axes of its box in its resting pose, the last upright."""
+
+    shape: PlacedShape
+    share: float
+    scales: tuple[float, float, float]
+
+
+def kin_hypotheses(
+    points: NDArray[np.float32],
+    frame: Frame,
+    object_id: int,
+    plane: Plane | None,
+    prior: Prior,
+    config: HypothesesConfig,
+    seed: int,
+) -> list[KinHypothesis]:
+    """The best fits that differ, whose shares leave to the completion what speaks against them.
+
+    points : (n, 3) observed, metres, camera frame. None where shapes have no plane to stand on, and
+    where no fit is convincing.
+    """
+    kin = config.kin
+    if plane is None or not kin.enabled:
+        return []
+    rng = child_rng(seed, "kin", object_id)
+    evidence = gather(points, frame, object_id, plane, kin, config.sensor, rng)
+    if len(evidence.seen) < kin.least_seen:
+        return []
+    library = kin_library(prior, kin)
+    fits = fit_kin(evidence, library, kin)
+    rows = _distinct(fits, library, kin)
+    hollow = library.hollow[fits.placements.stance[rows]]
+    shares = kin_shares(fits.score[rows], hollow, len(evidence.seen), kin)
+    limit = config.mean.limit
+    return [
+        _hypothesis(int(row), float(share), fits, evidence, library, prior, limit, kin)
+        for row, share in zip(rows, shares, strict=True)
+        if share >= kin.least_share
+    ]
+
+
+def kin_shares(
+    score: NDArray[np.floating], hollow: NDArray[np.floating], seen: int, config: KinConfig
+) -> Array:
+    """Shares (k,) of fits with scores (k,), best first: that of all of them follows from the best
+    one's, that of each from its distance to it.
+
+    hollow : (k,) of each shape; the completion is worse at walls than at solids
+    seen : observed points; of few of them nothing is certain
+    """
+    if not len(score):
+        return np.zeros(0)
+    walls = float(_walls(hollow[:1], config)[0])
+    gained = float(score[0]) + config.hollow_bonus * walls - config.convincing
+    together = expit(config.sharpness * gained)
+    together *= config.solid_most + (1 - config.solid_most) * walls
+    together *= min(1.0, seen / config.many_seen)
+    relative = np.exp(config.sharpness * (score.astype(np.float64) - float(score[0])))
+    return np.asarray(together * relative / relative.sum())
+
+
+def _walls(hollow: NDArray[np.floating], config: KinConfig) -> Array:
+    """(k,) from 0, a solid, to 1, a hollow thing, of shares of hollow space."""
+    low, high = config.hollow
+    return np.clip((np.asarray(hollow, np.float64) - low) / (high - low), 0, 1)
+
+
+def _distinct(fits: Fits, library: Library, config: KinConfig) -> NDArray[np.int64]:
+    """Rows of the best fits whose surfaces lie at least `config.distinct` metres apart, on
+    average."""
+    kept: list[int] = []
+    surfaces = fits.placements.placed(library.surface[fits.placements.stance])
+    for row in range(len(fits.score)):
+        points = surfaces[:, row, :: config.distinct_step].T
+        if kept:
+            known = fits.placements[np.array(kept)]
+            distance = distance_and_slopes(known, points, library)[0]
+            if np.abs(distance).mean(axis=1).min() < config.distinct:
+                continue
+        kept.append(row)
+        if len(kept) == config.hypotheses:
+            break
+    return np.array(kept, np.int64)
+
+
+def _hypothesis(
+    row: int,
+    share: float,
+    fits: Fits,
+    evidence: Evidence,
+    library: Library,
+    prior: Prior,
+    limit: float,
+    config: KinConfig,
+) -> KinHypothesis:
+    placements = fits.placements
+    stance = placements.stance[row]
+    name = library.names[library.object[stance]]
+    width = config.width + config.doubt * max(0.0, config.sure - float(fits.near[row]))
+    shape = PlacedShape(
+        name,
+        stretched(placements, row, prior.load(name).shape, library, config),
+        evidence.T_cam_plane @ pose(placements, row),
+        width,
+        limit,
+        # How far the shape is off says its width; the place is part of it.
+        np.zeros((6, 6)),
+        kin=True,
+        exact=config.exact if _walls(library.hollow[[stance]], config)[0] > 0 else 0.0,
+    )
+    x, y, z = (float(s) for s in placements.half[row] / library.half[stance])
+    return KinHypothesis(shape, share, (x, y, z))
