@@ -141,5 +141,7 @@ def _unmoved(last: Frame, frame: Frame, object_id: int, config: TrackConfig) -> 
     both = before & now & last.valid & frame.valid
     if not both.any():
         return False
-    apart = np.abs(last.points[both][:, 2] - frame.points[both][:, 2])
-    return bool(np.median(apart) <= config.still)
+    apart = frame.points[both][:, 2] - last.points[both][:, 2]
+    # Noise of single pixels is no motion: the middle of their differences tells of it.
+    shifted, scattered = abs(float(np.median(apart))), float(np.median(np.abs(apart)))
+    return shifted <= config.still and scattered <= config.noise

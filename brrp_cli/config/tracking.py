@@ -16,8 +16,9 @@ class TrackConfig:
     reach : that an object's middle may have moved between two frames to be still looked for;
         colour : mean difference of its colours, of 255, at most; growth : factor by which its
         number of pixels may differ
-    still : median distance along the ray between what was seen and what is seen of an object, or
-        of the background, that has not moved; still_mask : IoU of its two masks, at least
+    still : median of what depth has changed by, at most, on an object that has not moved; of the
+        background the median of its size; noise : median of its size on such an object, at most;
+        still_mask : IoU of its two masks, at least
     still_camera : metres and radians by which poses of one camera that stands may differ
     """
 
@@ -26,5 +27,6 @@ class TrackConfig:
     colour: float = 40.0
     growth: float = 2.0
     still: float = 0.002
+    noise: float = 0.005
     still_mask: float = share(0.9)
     still_camera: float = 0.0005
