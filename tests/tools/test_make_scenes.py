@@ -269,9 +269,7 @@ def test_noise_and_sensor_exclude_each_other(data, tmp_path):
 def test_stacked_objects_rest_on_and_in_one_another(data):
     write_box(data / "stacks", "003_brick", (0.2, 0.2, 0.06), (0, 0, 0), (0, 255, 0))
     outside = trimesh.creation.box((0.24, 0.24, 0.1))
-    tub = outside.difference(
-        trimesh.creation.box((0.2, 0.2, 0.1)).apply_translation((0, 0, 0.02))
-    )
+    tub = outside.difference(trimesh.creation.box((0.2, 0.2, 0.1)).apply_translation((0, 0, 0.02)))
     tub.export(data / "tub.obj")
     (brick,) = find_meshes(data / "stacks")
     small = load_model(find_meshes(data / "meshes")[0])
