@@ -61,7 +61,8 @@ class ConcaveEdgesConfig:
     reach : pixels to each side across which a crease is looked for; normal_step : pixels of the
         difference quotients of normals
     flat, sharp : degrees between both sides' normals: no crease, and surely one
-    faint : part of `flat` and `sharp` that is enough where colour changes by `colour` levels of 255
+    faint : part of `flat` and `sharp` that is enough where colour changes by `colour` levels of
+        255; 1 = colour does not matter. Less parts more stacked things and cuts more real ones
     near : metres; sides farther apart are two surfaces, whatever their normals
     steep : slope beyond which depth jumps; jump : metres that it jumps at least
     """
@@ -70,7 +71,7 @@ class ConcaveEdgesConfig:
     normal_step: int = 2
     flat: float = between(30.0, 0.0, 180.0)
     sharp: float = between(60.0, 0.0, 180.0)
-    faint: float = share(0.5)
+    faint: float = share(1.0)
     colour: float = 120.0
     near: float = 0.05
     steep: float = 6.0
@@ -85,8 +86,12 @@ class ComponentsConfig:
     least_border : pixels of a common border; meet : part of a border that is a crease, from which
     on two parts meet in one; neck : width of a border that joins nothing, as a part of the smaller
     part's width
+    levels : of each channel, of histograms; alike : share of their colours that two parts have in
+        common at least, where they are joined over a crease that colour alone made strong
     """
 
+    levels: int = between(4, 2, 32)
+    alike: float = share(0.15)
     calm: float = share(0.3)
     least_core: int = 30
     least_border: int = 4

@@ -40,9 +40,29 @@ def join_parts(
     """Labels (H, W) after neighbours whose common border is mostly no boundary were joined, unless
     the border is but a neck between two wide parts."""
     border, length = _borders(parts, boundary)
-    width = _widths(parts, len(length))
-    neck = np.maximum(config.least_border, config.neck * np.minimum(width, width[:, None]))
-    return relabel(parts, (length >= neck) & (border < threshold * length))
+    return relabel(parts, _wide(parts, length, config) & (border < threshold * length))
+
+
+def join_alike(
+    parts: NDArray[np.int64],
+    boundary: NDArray[np.float64],
+    rgb: NDArray[np.uint8],
+    threshold: float,
+    config: ComponentsConfig,
+) -> NDArray[np.int64]:
+    """`join_parts` of those neighbours alone that have colours in common: what stands on another
+    thing differs from it, pieces of one print do not. rgb : (H, W, 3)"""
+    border, length = _borders(parts, boundary)
+    wide = _wide(parts, length, config) & (border < threshold * length)
+    colours = rgb.astype(np.int64) * config.levels // 256
+    codes = (colours[..., 0] * config.levels + colours[..., 1]) * config.levels + colours[..., 2]
+    shares = np.zeros((len(length), config.levels**3))
+    np.add.at(shares, (parts.ravel(), codes.ravel()), 1.0)
+    shares /= np.maximum(shares.sum(axis=1, keepdims=True), 1.0)
+    alike = np.zeros_like(wide)
+    for i, j in np.argwhere(wide):
+        alike[i, j] = np.minimum(shares[i], shares[j]).sum() > config.alike
+    return relabel(parts, alike)
 
 
 def split_at_strongest(
@@ -115,6 +135,15 @@ def _borders(
         np.add.at(border, (low, high), strength[meet])
         np.add.at(length, (low, high), 1.0)
     return border, length
+
+
+def _wide(
+    parts: NDArray[np.int64], length: NDArray[np.float64], config: ComponentsConfig
+) -> NDArray[np.bool_]:
+    """(n + 1, n + 1) whether the common border of two parts is more than a neck."""
+    width = _widths(parts, len(length))
+    neck = np.maximum(config.least_border, config.neck * np.minimum(width, width[:, None]))
+    return np.asarray(length >= neck)
 
 
 def _widths(parts: NDArray[np.int64], count: int) -> NDArray[np.float64]:

@@ -17,7 +17,7 @@ from brrp_cli.dependencies import import_library
 from brrp_cli.errors import FrameError
 from brrp_cli.frames.frame import BACKGROUND, Frame
 from brrp_cli.geometry import backproject
-from brrp_cli.segmentation.components import absorb_small, find_parts, join_parts
+from brrp_cli.segmentation.components import absorb_small, find_parts, join_alike, join_parts
 from brrp_cli.segmentation.concave_edges import (
     colour_edges,
     depth_jumps,
@@ -80,13 +80,17 @@ def segment(
         rim = on_table & (height > config.rim * lift)
         floor = on_table & (height > -config.max_height)
     normals = surface_normals(points, config.concave_edges)
-    crease = _creases(points, normals, frame.rgb, config.concave_edges)
+    sharp, crease = _creases(points, normals, frame.rgb, config.concave_edges)
     jumps = depth_jumps(depth, frame.K, config.concave_edges)
     boundary = np.maximum(crease, jumps)
     # Across a jump nothing meets, however the surfaces on both sides lie.
-    meets = np.where(ndimage.binary_dilation(jumps, iterations=2), 0.0, crease)
+    meets = np.where(ndimage.binary_dilation(jumps, iterations=2), 0.0, sharp)
     parts = find_parts(risen, boundary, config.components)
     parts = join_parts(parts, boundary, config.border, config.components)
+    if config.concave_edges.faint < 1:
+        # A crease that only colour made strong parts what differs in colour as a whole.
+        sharp = np.maximum(sharp, jumps)
+        parts = join_alike(parts, sharp, frame.rgb, config.border, config.components)
     parts = join_on_one_spot(parts, plan, height, table.plan(normals), meets, frame.rgb, config)
     parts = split_stacks(parts, frame.rgb, height, config.stacks)
     small = _areas(parts, frame) < config.min_area
@@ -110,13 +114,14 @@ def _creases(
     normals: NDArray[np.floating],
     rgb: NDArray[np.uint8],
     config: ConcaveEdgesConfig,
-) -> NDArray[np.floating]:
-    """(H, W) hollow creases, 0 to 1: sharp ones, and faint ones where colour changes too."""
+) -> tuple[NDArray[np.floating], NDArray[np.floating]]:
+    """Hollow creases (H, W), 0 to 1: sharp ones alone, and with faint ones where colour changes."""
     angles = hollow_angles(points, normals, config)
+    sharp = strength(angles, config.flat, config.sharp)
+    if config.faint == 1:
+        return sharp, sharp
     faint = strength(angles, config.faint * config.flat, config.faint * config.sharp)
-    return np.maximum(
-        strength(angles, config.flat, config.sharp), faint * colour_edges(rgb, config)
-    )
+    return sharp, np.maximum(sharp, faint * colour_edges(rgb, config))
 
 
 def _without(

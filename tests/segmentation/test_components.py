@@ -10,8 +10,13 @@ from brrp_cli.config.segmentation import (
     SmoothDepthConfig,
 )
 from brrp_cli.geometry import backproject
-from brrp_cli.segmentation.components import absorb_small, find_parts, join_parts
-from brrp_cli.segmentation.concave_edges import depth_jumps, hollow_creases, surface_normals
+from brrp_cli.segmentation.components import absorb_small, find_parts, join_alike, join_parts
+from brrp_cli.segmentation.concave_edges import (
+    colour_edges,
+    depth_jumps,
+    hollow_creases,
+    surface_normals,
+)
 from brrp_cli.segmentation.region_growing import fill_holes
 from brrp_cli.segmentation.smooth_depth import flying_pixels, smooth_depth
 
@@ -111,3 +116,15 @@ def test_holes_in_one_thing_are_filled_and_those_between_two_are_not():
     assert (filled[5:9, 5:9] == 1).all()
     assert (filled[5:9, 18:23] == 0).all()
     assert (filled[0:3, 30:33] == 0).all()
+
+
+def test_neighbours_of_one_colour_are_joined_and_those_of_two_are_not():
+    parts = np.repeat([[1] * 10 + [2] * 10 + [3] * 10], 20, axis=0)
+    rgb = np.full((20, 30, 3), 200, np.uint8)
+    rgb[:, 20:] = (200, 20, 20)
+    calm = np.zeros(parts.shape)
+    joined = join_alike(parts, calm, rgb, 0.45, PARTS)
+    assert np.array_equal(joined, np.where(parts == 3, 2, 1))
+    assert np.array_equal(join_alike(parts, calm + 1, rgb, 0.45, PARTS), parts)
+    edges = colour_edges(rgb, EDGES)
+    assert (edges[:, 18:22] == 1).all() and edges[:, :10].max() == 0
