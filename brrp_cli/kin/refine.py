@@ -18,6 +18,8 @@ Array = NDArray[np.float64]
 UNKNOWNS = 8
 # A step of each at most: radians, metres, logarithms, a share.
 LARGEST = np.array([0.35, *[0.03] * 3, *[0.3] * 3, 0.15])
+# What no point sees, such as the turn of what is round, stays: far below any point's weight.
+LEAST = 1e-3
 # A cone to its tip has 1.
 MOST_TAPER = 0.6
 
@@ -41,7 +43,8 @@ def refined(
         prior_H, prior_g = _prior(placements, library, config)
         H += prior_H
         g += prior_g
-        H[:, range(UNKNOWNS), range(UNKNOWNS)] *= 1 + config.damping
+        diagonal = H[:, range(UNKNOWNS), range(UNKNOWNS)]
+        H[:, range(UNKNOWNS), range(UNKNOWNS)] = diagonal * (1 + config.damping) + LEAST
         step = -np.asarray(np.linalg.solve(H, g[..., None])[..., 0], dtype=np.float64)
         placements = _moved(placements, step)
     return placements

@@ -16,6 +16,7 @@ from brrp_cli.kin.evidence import gather
 from brrp_cli.kin.fit import fit_kin
 from brrp_cli.kin.library import kin_library
 from brrp_cli.kin.placement import Placements, distance_and_slopes
+from brrp_cli.kin.refine import refined
 from brrp_cli.kin.stretched import pose, stretched
 from brrp_cli.methods.kin_hypotheses import kin_shares
 from brrp_cli.raycast import inside
@@ -155,6 +156,26 @@ def test_a_library_is_the_same_whoever_asks(prior):
     assert len(other.object) == 3 and set(other.names) == {"box", "bowl", "can"}
     hollow = dict(zip(other.names, other.hollow, strict=True))
     assert hollow["bowl"] > 0.4 and hollow["box"] < 0.05 and hollow["can"] < 0.05
+
+
+def test_a_step_that_no_point_says_anything_about_is_none(prior):
+    """Far from everything that was seen, nothing holds the turn."""
+    frame = photograph({ID: of_other_proportions(bowl(), SCALES)})
+    points = frame.object_points(ID)
+    sensor = CONFIG.hypotheses.sensor
+    evidence = gather(points, frame, ID, TABLE, KIN, sensor, np.random.default_rng(0))
+    library = kin_library(prior, KIN)
+    half = library.half[:1]
+    far = Placements(
+        np.array([0]),
+        np.array([0.3], np.float32),
+        np.array([[1e4, -1e4, half[0, 2]]], np.float32),
+        half,
+        np.zeros(1, np.float32),
+    )
+    moved = refined(far, evidence, library, KIN)
+    assert moved.turn[0] == pytest.approx(0.3, abs=1e-3)
+    assert np.isfinite(moved.half).all() and np.isfinite(moved.middle).all()
 
 
 def test_without_a_plane_there_is_no_kin(prior):
