@@ -14,11 +14,15 @@ def no_clip_of_the_users(tmp_path_factory: pytest.TempPathFactory):
         yield
 
 
+LEVELS = [(logger, logger.level) for logger in (logging.getLogger(), logging.getLogger("brrp_cli"))]
+
+
 @pytest.fixture(autouse=True)
 def log_level_is_restored():
-    """A command that is run in this process sets the level, as with `--quiet`, for good."""
-    loggers = [logging.getLogger(), logging.getLogger("brrp_cli")]
-    levels = [logger.level for logger in loggers]
+    """A command that is run in this process, by a fixture too, sets the level for good, as with
+    `--quiet`."""
+    for logger, level in LEVELS:
+        logger.setLevel(level)
     yield
-    for logger, level in zip(loggers, levels, strict=True):
+    for logger, level in LEVELS:
         logger.setLevel(level)

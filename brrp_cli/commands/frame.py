@@ -35,7 +35,6 @@ def command(
       brrp frame bop/ycbv/test --index 000048/1 -o frame.npz
       brrp frame recording.bag --index 30 --prompt "small object" -o frame.npz
     """
-    source.check()
     makes_masks = segment or source.prompt is not None
     if source.masks is not None and segment:
         raise click.UsageError("--masks and --segment exclude each other")
@@ -44,6 +43,7 @@ def command(
     output = require_output(output)
     if output.suffix != ".npz":
         raise click.UsageError(f"-o must end in .npz, not {output.name!r}")
+    source.check()
     picture = output.with_suffix(".masks.png")
     refuse_existing([output, picture] if makes_masks else [output], overwrite)
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from brrp_cli.commands.json_option import json_option, report_of
-from brrp_cli.commands.seed_option import SEED
+from brrp_cli.commands.seed_option import SEED, SEED_HELP
 from brrp_cli.config.grasping import GraspConfig
 from brrp_cli.grasping.gripper_file import DEFAULT, gripper_names, open_gripper
 from brrp_cli.grasping.layouts import LAYOUTS
@@ -28,7 +28,12 @@ GRIPPER_HELP = f"{', '.join(gripper_names())}, or a YAML file."
 
 @click.command("grasp")
 @click.argument("results", metavar="OUT/", type=click.Path(path_type=Path))
-@click.option("-o", "--output", type=click.Path(path_type=Path), help=f"[default: OUT/{RECORD}]")
+@click.option(
+    "-o",
+    "--output",
+    type=click.Path(path_type=Path),
+    help=f"Where the grasps go. [default: OUT/{RECORD}]",
+)
 @click.option(
     "--gripper", metavar="NAME|FILE.yaml", default=DEFAULT, show_default=True, help=GRIPPER_HELP
 )
@@ -40,7 +45,13 @@ GRIPPER_HELP = f"{', '.join(gripper_names())}, or a YAML file."
     help=f"top-down: within {GraspConfig.top_down:g} degrees of straight down; "
     f"cone: within {GraspConfig.cone:g}.",
 )
-@click.option("--per-object", type=click.IntRange(1, 1000), default=PER_OBJECT, show_default=True)
+@click.option(
+    "--per-object",
+    type=click.IntRange(1, 1000),
+    default=PER_OBJECT,
+    show_default=True,
+    help="Grasps of an object, at most.",
+)
 @click.option(
     "--min-score",
     type=click.FloatRange(0, 1),
@@ -72,7 +83,7 @@ GRIPPER_HELP = f"{', '.join(gripper_names())}, or a YAML file."
     help=f"Beside {RECORD}, and a GLB of the best hands, an array as GraspNet's API or "
     "contact_graspnet has it.",
 )
-@click.option("--seed", type=SEED, default=0, show_default=True)
+@click.option("--seed", type=SEED, default=0, show_default=True, help=SEED_HELP)
 @json_option
 @click.option("--overwrite", is_flag=True, help="Replace the files that -o names.")
 def command(

@@ -163,8 +163,6 @@ def parse_manifest(data: bytes, path: Path) -> Manifest:
         _check_sum(data)
         table = parse_json(data.decode("utf-8"))
         _refuse_foreign(table, path)
-        if "content_sha256" not in table:
-            raise ValueError("no content_sha256")
         manifest = Manifest(
             parameters=dict(table["parameters"]),
             objects=[ObjectEntry(**entry) for entry in table["objects"]],
@@ -185,10 +183,10 @@ def _sum(data: bytes) -> str:
 
 
 def _check_sum(data: bytes) -> None:
-    """ValueError if the manifest states a sum that it does not have."""
+    """ValueError if the manifest states no sum, or one that it does not have."""
     told = _OWN_SUM.search(data)
     if told is None:
-        return
+        raise ValueError("no content_sha256")
     start, end = told.span(1)
     if _sum(data[:start] + _NOTHING.encode() + data[end:]) != told[1].decode():
         raise ValueError("bytes that do not have the manifest's own sha256")

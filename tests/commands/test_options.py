@@ -60,6 +60,7 @@ WRONG = {
     "reconstruct": ["nowhere"],
     "view": ["nowhere"],
     "export": ["nowhere"],
+    "grasp": ["nowhere"],
     "config show": ["--preset", "nonsense"],
     "fetch": ["nonsense"],
     "eval": ["nowhere"],

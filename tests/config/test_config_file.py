@@ -115,6 +115,7 @@ def test_the_one_that_was_meant_is_named(tmp_path):
 
 def test_commands_tell_it_before_the_work(tmp_path):
     path = written(tmp_path, "[surface]\nspacing = 0\n")
+    (tmp_path / "none.npz").touch()
     for command in (
         ["config", "show", "--config", str(path)],
         ["reconstruct", str(tmp_path / "none.npz"), "--config", str(path)],

@@ -112,10 +112,10 @@ def test_a_scheduler_file_serves_as_an_address(address: str, tmp_path: Path) -> 
 
 def test_a_scheduler_that_goes_away_is_told(tmp_path: Path) -> None:
     with (
-        LocalCluster(0, dashboard_address=":0", silence_logs=60) as started,
+        LocalCluster(1, dashboard_address=":0", silence_logs=60) as started,
         open_executor(scheduler=started.scheduler_address) as executor,
     ):
-        results = executor.run(act, [("a", tmp_path)], 60.0)
+        results = executor.run(act, [("hang once", tmp_path)], 60.0)
         threading.Timer(0.5, started.close).start()
         with pytest.raises(ClusterError, match="The Dask scheduler is gone"):
             next(results)
