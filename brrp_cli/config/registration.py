@@ -197,7 +197,7 @@ class LikelihoodConfig:
     below: float = 6.0
     colour: float = 4.4
     most_votes: float = 13.0
-    base: float = between(1.6, -50.0, 50.0)
+    base: float = between(0.6, -50.0, 50.0)
     other_size: float = 3.6
     within: float = 0.5
 
