@@ -13,7 +13,7 @@ from brrp_cli.inference.placed_shape import PlacedShape
 from brrp_cli.raycast import inside
 from brrp_cli.surface.around_mesh import around_axes, beyond_reach, marching_cubes_of
 
-CONFIG = SurfaceConfig()
+CONFIG = SurfaceConfig(around_nodes=400_000)
 
 
 def shape_of(name):
@@ -31,8 +31,7 @@ def region(shape, reach):
     )
 
 
-@pytest.mark.parametrize("name", ["box", "beaker"])
-@pytest.mark.parametrize("reach", [0.001, 0.004])
+@pytest.mark.parametrize(("name", "reach"), [("box", 0.001), ("beaker", 0.0025)])
 def test_it_is_closed_and_ends_at_the_reach(name, reach):
     shape = shape_of(name)
     found = region(shape, reach)
@@ -42,7 +41,7 @@ def test_it_is_closed_and_ends_at_the_reach(name, reach):
     assert np.abs(distance - reach).mean() < 0.0001
 
 
-@pytest.mark.parametrize("name", ["box", "beaker", "ell"])
+@pytest.mark.parametrize("name", ["beaker", "ell"])
 def test_the_shape_moved_by_less_lies_inside(name):
     # Moved vertices would leave out the beaker's floor, where its walls are nearer than the reach.
     shape = shape_of(name)
