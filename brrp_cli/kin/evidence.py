@@ -14,7 +14,7 @@ from brrp_cli.frames.frame import Frame
 from brrp_cli.frames.projection import at_pixels
 from brrp_cli.geometry import transform_points
 from brrp_cli.observation.sensor_noise import depth_deviation
-from brrp_cli.observation.subsample import grid_subsample
+from brrp_cli.observation.subsample import dense_points, grid_subsample
 from brrp_cli.observation.support_plane import Plane, plane_frame
 
 Array = NDArray[np.float64]
@@ -54,10 +54,11 @@ def gather(
     sensor: SensorConfig,
     rng: np.random.Generator,
 ) -> Evidence:
-    """From an object's observed points (n, 3), metres, camera frame.
-    They are merged in cells,
-       so that near and far parts count alike."""
+    """From an object's observed points (n, 3), metres, camera frame. They are merged in cells, so
+    that near and far parts count alike, and so would what is smeared beyond the object's edges: it
+    is left out."""
     T_plane_cam = plane_frame(plane)
+    points = dense_points(points, config.dense_cell, config.least_dense)
     seen = rng.permutation(grid_subsample(points, config.cell))[: config.seen_points]
     free = _free(points, frame, object_id, config, rng)
     placed = transform_points(T_plane_cam, free).astype(np.float32)

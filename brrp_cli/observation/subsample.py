@@ -30,3 +30,17 @@ def grid_subsample(points: NDArray[np.floating], cell: float) -> NDArray[np.floa
     occupied = count > 0
     sums = np.stack([np.bincount(index, weights=column)[occupied] for column in columns], axis=-1)
     return (sums / count[occupied, None]).astype(np.float32)
+
+
+def dense_points(
+    points: NDArray[np.floating], cell: float, least_share: float
+) -> NDArray[np.floating]:
+    """Those of points (n, 3), metres, whose grid cell of `cell` metres holds a share `least_share`
+    of what the cell of a median point holds: the pixels that a sensor smears from an edge to what
+    lies behind it are few and far between."""
+    if not len(points):
+        return points
+    cells = np.floor(points / cell).astype(np.int64)
+    _, cell_of, count = np.unique(cells, axis=0, return_inverse=True, return_counts=True)
+    around = count[cell_of.ravel()]
+    return points[around >= least_share * np.median(around)]

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
 from brrp_cli.observation import subsample
-from brrp_cli.observation.subsample import grid_subsample
+from brrp_cli.observation.subsample import dense_points, grid_subsample
 
 CLOUDS = hnp.arrays(
     np.float64, st.tuples(st.integers(1, 60), st.just(3)), elements=st.floats(-0.5, 0.5)
@@ -52,3 +52,13 @@ def test_nothing_gives_nothing():
 def test_float32_far_from_the_origin_keeps_its_millimetres():
     points = (np.array([[0.1, 0.2, 9.0]]) + np.zeros((100_000, 1))).astype(np.float32)
     assert np.allclose(grid_subsample(points, 0.05), points[:1], atol=1e-6)
+
+
+def test_a_smear_behind_an_edge_is_left_out_and_the_surface_stays():
+    rng = np.random.default_rng(0)
+    wall = rng.uniform([0, 0, 0.5], [0.08, 0.06, 0.501], (5_000, 3))
+    smear = rng.uniform([0.08, 0, 0.5], [0.083, 0.06, 0.7], (200, 3))
+    kept = dense_points(np.concatenate([wall, smear]), 0.008, 0.2)
+    assert (kept[:, 2] < 0.51).sum() > 0.97 * len(wall)
+    assert (kept[:, 2] > 0.51).sum() == 0
+    assert len(dense_points(np.zeros((0, 3)), 0.008, 0.2)) == 0
