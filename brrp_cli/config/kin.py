@@ -20,8 +20,9 @@ class KinConfig:
     probable resting poses with a probability of `least_pose` or more. Coarse distances are kept at
     `nodes` nodes along each axis of the box, which they reach over by the factor `reach`;
     `surface_points` of the surface stand for it.
-    What was seen: points in cells of `dense_cell` metres that hold a share `least_dense` of what the
-    cell of a median point holds; `seen_points` of them at most, merged in cells of `cell` metres, and
+    What was seen: points in cells of `dense_cell` metres that hold a share `least_dense` of what
+    the cell of a median point holds; `seen_points` of them at most, merged in cells of `cell`
+    metres, and
     `free_points` of free space, from `free_gap` metres in front of the measured depth on, a share
     `free_beside` of them in a ring of pixels about the silhouette, from the first of `ring` to the
     second. Nearer to it a pixel may be anyone's. A share `at_edge` of those lies as deep as the
