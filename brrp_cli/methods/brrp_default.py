@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -10,7 +9,7 @@ from numpy.typing import NDArray
 
 from brrp_cli.completion.completed_mean import completed_grid, empty_space
 from brrp_cli.completion.visible_part import VisiblePart, visible_part
-from brrp_cli.config import Config, FittedMapConfig, HypothesesConfig, MeanConfig, WeighConfig
+from brrp_cli.config import Config, FittedMapConfig, HypothesesConfig, MeanConfig
 from brrp_cli.frames.frame import Frame
 from brrp_cli.inference.hypothesis_posterior import HypothesisPosterior, MeanFunction
 from brrp_cli.inference.infer_hypotheses import Problem, infer_correction
@@ -25,13 +24,13 @@ from brrp_cli.observation.soft_samples import soft_samples
 from brrp_cli.observation.support_plane import Plane
 from brrp_cli.prior.store import Prior
 from brrp_cli.reconstruction import OK, ObjectReconstruction, Retrieved, Similar
-from brrp_cli.registration.likelihood import evidence, log_likelihood, see
 from brrp_cli.registration.model import search_model
 from brrp_cli.registration.pose_covariance import pose_covariance
 from brrp_cli.registration.pose_search import Hypothesis, search
 from brrp_cli.registration.ray_refinement import refine_by_rays
 from brrp_cli.registration.scale_scan import observed_cloud
 from brrp_cli.registration.verification import Verifier
+from brrp_cli.registration.weigh import log_likelihoods, weigh
 from brrp_cli.retrieval.base import Retriever, top_k, unknown
 from brrp_cli.seeds import child_rng, child_seed
 from brrp_cli.timing import timed
@@ -86,7 +85,7 @@ def reconstruct_by_hypotheses(
             )
         placed = [each for group in found for each in group]
         shares = [p for (_, p), group in zip(chosen, found, strict=True) for _ in group]
-        ratios = _log_likelihoods(placed, frame, object_id, plane, noise, hypotheses)
+        ratios = log_likelihoods(placed, frame, object_id, plane, noise, hypotheses)
         weights = weigh(shares, ratios, missing, hypotheses.weigh)
         like: list[KinHypothesis] = []
         if weights[-1] >= hypotheses.kin.least_unknown:
@@ -135,50 +134,6 @@ def reconstruct_by_hypotheses(
         posterior=posterior,
         seconds=seconds,
     )
-
-
-def _log_likelihoods(
-    placed: list[Hypothesis],
-    frame: Frame,
-    object_id: int,
-    plane: Plane | None,
-    noise: PixelNoise,
-    config: HypothesesConfig,
-) -> list[float]:
-    """Of each placement, against that it is none of the stored objects, nats."""
-    likelihood, sensor = config.likelihood, config.sensor
-    seen = see(frame, object_id, plane, noise, sensor.patch, sensor.bleed, likelihood)
-    best = max((each.alignment_score for each in placed), default=-np.inf)
-    ratios = []
-    for each in placed:
-        ratio = -np.inf
-        if each.alignment_score >= best - likelihood.within:
-            found = evidence(each.T_cam_model, each.model, seen, likelihood, config.search.colour)
-            resized = abs(np.log(each.scale)) > config.search.least_size_change
-            ratio = log_likelihood(found, likelihood) - likelihood.other_size * resized
-        ratios.append(ratio)
-    return ratios
-
-
-def weigh(
-    shares: Sequence[float], log_ratios: Sequence[float], missing: float, config: WeighConfig
-) -> Array:
-    """Weights (C + 1,), sum 1, of C hypotheses and, last, of the one that it is something else.
-
-    shares : P(c|R) of each hypothesis's object; log_ratios : how much more probable each makes the
-    frame than the last one does, nats; missing : P(not in the prior | R).
-    """
-    none = float(np.clip(missing, config.least_unknown, config.most_unknown))
-    known = np.asarray(shares, dtype=np.float64)
-    # Ratios among the stored objects are the retriever's, how likely they are as a whole is not:
-    # a likelihood that is above all doubt outweighs a retriever that was wrong.
-    if not known.any():
-        known = np.ones_like(known)
-    probability = np.append(known / (known.sum() or 1.0) * (1 - none), none)
-    ratios = np.append(np.asarray(log_ratios, dtype=np.float64), 0.0)
-    log = np.log(np.maximum(probability, config.least_share)) + ratios
-    weights = np.exp(log - log.max())
-    return np.asarray(weights / weights.sum())
 
 
 def _infer(

@@ -10,11 +10,11 @@ from table_scene import MESHES, PARAMETERS, TABLE, in_camera, photograph, placed
 
 from brrp_cli.config import SearchConfig, WeighConfig
 from brrp_cli.geometry import similarity, transform_points
-from brrp_cli.methods.brrp_default import weigh
 from brrp_cli.registration import verification as verifier
 from brrp_cli.registration.model import search_model
 from brrp_cli.registration.pose_search import search
 from brrp_cli.registration.scale_scan import observed_cloud
+from brrp_cli.registration.weigh import weigh
 
 ID = 5
 CONFIG = SearchConfig()

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from brrp_cli.config import WeighConfig
-from brrp_cli.methods.brrp_default import weigh
+from brrp_cli.registration.weigh import weigh
 
 CONFIG = WeighConfig()
 

@@ -1,0 +1,61 @@
+"""Weights of placements, and of "none of the stored objects", from likelihoods and P(c|R)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brrp_cli.config import HypothesesConfig, WeighConfig
+from brrp_cli.frames.frame import Frame
+from brrp_cli.observation.pixel_noise import PixelNoise
+from brrp_cli.observation.support_plane import Plane
+from brrp_cli.registration.likelihood import evidence, log_likelihood, see
+from brrp_cli.registration.pose_search import Hypothesis
+
+Array = NDArray[np.float64]
+
+
+def log_likelihoods(
+    placed: list[Hypothesis],
+    frame: Frame,
+    object_id: int,
+    plane: Plane | None,
+    noise: PixelNoise,
+    config: HypothesesConfig,
+) -> list[float]:
+    """Of each placement, against that it is none of the stored objects, nats."""
+    likelihood, sensor = config.likelihood, config.sensor
+    seen = see(frame, object_id, plane, noise, sensor.patch, sensor.bleed, likelihood)
+    best = max((each.alignment_score for each in placed), default=-np.inf)
+    ratios = []
+    for each in placed:
+        ratio = -np.inf
+        if each.alignment_score >= best - likelihood.within:
+            found = evidence(each.T_cam_model, each.model, seen, likelihood, config.search.colour)
+            resized = abs(np.log(each.scale)) > config.search.least_size_change
+            ratio = log_likelihood(found, likelihood) - likelihood.other_size * resized
+        ratios.append(ratio)
+    return ratios
+
+
+def weigh(
+    shares: Sequence[float], log_ratios: Sequence[float], missing: float, config: WeighConfig
+) -> Array:
+    """Weights (C + 1,), sum 1, of C hypotheses and, last, of the one that it is something else.
+
+    shares : P(c|R) of each hypothesis's object; log_ratios : how much more probable each makes the
+    frame than the last one does, nats; missing : P(not in the prior | R).
+    """
+    none = float(np.clip(missing, config.least_unknown, config.most_unknown))
+    known = np.asarray(shares, dtype=np.float64)
+    # Ratios among the stored objects are the retriever's, how likely they are as a whole is not:
+    # a likelihood that is above all doubt outweighs a retriever that was wrong.
+    if not known.any():
+        known = np.ones_like(known)
+    probability = np.append(known / (known.sum() or 1.0) * (1 - none), none)
+    ratios = np.append(np.asarray(log_ratios, dtype=np.float64), 0.0)
+    log = np.log(np.maximum(probability, config.least_share)) + ratios
+    weights = np.exp(log - log.max())
+    return np.asarray(weights / weights.sum())
