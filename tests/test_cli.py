@@ -148,7 +148,7 @@ def test_quiet_leaves_results_and_errors_alone(tmp_path: Path) -> None:
     arguments = ["build-prior", str(tmp_path), "--samples", "100", "-o"]
     loud = CliRunner().invoke(main, [*arguments, str(tmp_path / "loud")])
     quiet = CliRunner().invoke(main, ["-q", *arguments, str(tmp_path / "quiet")])
-    after = CliRunner().invoke(main, [*arguments, str(tmp_path / "after"), "--quiet"])
+    after = CliRunner().invoke(main, [*arguments, str(tmp_path / "quiet"), "--quiet"])
     both = CliRunner().invoke(main, ["-q", *arguments, str(tmp_path / "both"), "-v"])
     assert both.exit_code == 2 and "exclude each other" in both.stderr
     assert "Prior:" in loud.stderr

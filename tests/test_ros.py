@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 from table_scene import SHAPE, T_CAM_WORLD, K, in_camera, photograph
 
-import brrp_cli
 from brrp_cli import Reconstructor
 from brrp_cli.errors import FrameError
 from brrp_cli.ros import Newest, answer
@@ -21,7 +20,7 @@ pytest.importorskip("rosbags")
 from rosbags.typesys import Stores, get_typestore
 
 STORES = {"ros1": Stores.ROS1_NOETIC, "ros2": Stores.ROS2_HUMBLE}
-NODE = Path(brrp_cli.__file__).parents[1] / "tools" / "ros2_node.py"
+NODE = Path(__file__).parents[1] / "tools" / "ros2_node.py"
 
 
 def packed(store, message, ros1):

@@ -18,4 +18,5 @@ bash tools/check_wheel.sh .venv-test
 # `pytest`, not `python -m pytest`: the installed package is tested, not the checkout.
 # It ends with 1 where a test fails and with 5 where none ran.
 export OMP_NUM_THREADS=1
-"$bin/pytest" -n 2 "$@"
+# A file's tests go to one worker, so that what they share is made once.
+"$bin/pytest" -n 2 --dist loadfile "$@"

@@ -160,9 +160,9 @@ def read_bytes(folder: Path) -> bytes:
 def parse_manifest(data: bytes, path: Path) -> Manifest:
     """The manifest with these bytes, checked; `path` is for messages. Errors: PriorError."""
     try:
-        _check_sum(data)
         table = parse_json(data.decode("utf-8"))
         _refuse_foreign(table, path)
+        _check_sum(data)
         manifest = Manifest(
             parameters=dict(table["parameters"]),
             objects=[ObjectEntry(**entry) for entry in table["objects"]],

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import dataclass
 from pathlib import Path
+from shutil import copyfile
 
 import numpy as np
 import pytest
 from eight_objects import NETWORK, write_scenes
+from filelock import FileLock
 from training.examples import Examples, Recipe, scene_examples
 
 from brrp_cli.ground_truth.scenes import Scene
@@ -44,8 +47,23 @@ def place(tmp_path_factory) -> Place:
 
 
 @pytest.fixture(scope="session")
-def learnt(place) -> Place:
-    """The same after a training that has learnt the eight by heart: all of them in every step."""
+def learnt(place, tmp_path_factory) -> Place:
+    """The same after a training that has learnt the eight by heart, once for all workers."""
+    shared = place.weights
+    if "PYTEST_XDIST_WORKER" in os.environ:
+        shared = tmp_path_factory.getbasetemp().parent / place.weights.name
+    with FileLock(shared.with_suffix(".lock")):
+        if not shared.is_file():
+            train(place)
+            if shared != place.weights:
+                place.weights.rename(shared)
+    if shared != place.weights:
+        copyfile(shared, place.weights)
+    return place
+
+
+def train(place: Place) -> None:
+    """All of the eight in every step."""
     from training.pointsdf import Training, TrainingConfig
 
     from brrp_cli.methods.pointsdf.weights import save_weights
@@ -60,4 +78,3 @@ def learnt(place) -> Place:
         training.step(place.examples, eight, number)
     training.settle(place.examples, [eight] * 16)
     save_weights(training.network, about, place.weights, half=True)
-    return place
