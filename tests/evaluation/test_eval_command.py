@@ -188,6 +188,7 @@ def test_another_run_in_the_folder_is_refused(place, first):
     assert result.exit_code == 1 and "thesis.txt" in result.output
 
 
+@pytest.mark.slow
 def test_bare_the_report_lies_beside_the_scenes_and_shifts_are_compared(place):
     result = run(place, "--method", "vprism", "--shift-masks", "0,2", "--noise", "--scenes", "0:1")
     assert result.exit_code == 0, result.output

@@ -126,6 +126,7 @@ def test_frames_grow_in_one_thing_only(frame):
     np.testing.assert_allclose(*centers, atol=0.002)
 
 
+@pytest.mark.slow
 def test_the_benchmark_keeps_what_it_measured(frame, tmp_path):
     meshes = tmp_path / "meshes"
     meshes.mkdir()

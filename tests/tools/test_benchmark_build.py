@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 
+import pytest
 from benchmark_build import main
 from click.testing import CliRunner
 from table_scene import box
@@ -11,6 +12,7 @@ from table_scene import box
 from brrp_cli.threads import cores
 
 
+@pytest.mark.slow
 def test_a_mesh_is_timed_by_stages_and_a_build_as_a_whole(tmp_path):
     meshes, history = tmp_path / "meshes", tmp_path / "history.jsonl"
     meshes.mkdir()

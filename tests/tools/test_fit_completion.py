@@ -27,6 +27,7 @@ def examples(count, seed):
     return Examples(x, x[:, 0] < x[:, 2])
 
 
+@pytest.mark.slow
 def test_what_can_be_learned_is_learned_and_a_seed_gives_one_network():
     train, held = examples(20_000, 0), examples(4_000, 1)
     network = fit(train, held, 20, 0)

@@ -31,6 +31,7 @@ def history(folder):
     return [{k: v for k, v in record.items() if k != "seconds"} for record in records]
 
 
+@pytest.mark.slow
 def test_trains_and_goes_on_and_says_what_it_was_trained_on(place, tmp_path):
     whole, parted = tmp_path / "whole", tmp_path / "parted"
     result = run(place / "scenes", "--data-root", place, "-o", whole, "--epochs", 2, *SMALL)

@@ -106,6 +106,7 @@ def report(learnt, tmp_path_factory):
     return folder / "out", run(*command, *where), [*command, *where]
 
 
+@pytest.mark.slow
 def test_two_trainings_stand_side_by_side(report):
     folder, result, _ = report
     assert result.exit_code == 0, result.output
@@ -127,6 +128,7 @@ def test_two_trainings_stand_side_by_side(report):
     assert (folder / "plots" / "iou_shift.png").exists()
 
 
+@pytest.mark.slow
 def test_the_level_is_what_counts_in_the_report(report):
     """At 0.3, as published: exact IoU is that of a network which learnt the objects by heart."""
     summary = json.loads((report[0] / "summary.json").read_text())
@@ -134,6 +136,7 @@ def test_the_level_is_what_counts_in_the_report(report):
     assert summary["trained"]["eight"]["name"] == "eight"
 
 
+@pytest.mark.slow
 def test_a_report_goes_on_and_other_weights_are_another_run(report, learnt, tmp_path):
     folder, _, command = report
     before = (folder / "rows.jsonl").read_bytes()

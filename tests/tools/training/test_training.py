@@ -153,6 +153,7 @@ def test_scenes_are_held_out():
     assert [len(part) for part in split(["a", "b"], 0.0, seed=0)] == [1, 1]
 
 
+@pytest.mark.slow
 def test_eight_objects_are_learnt_by_heart(learnt):
     """And so is what lies between the points that the training asked."""
     network = load_weights(learnt.weights).network
