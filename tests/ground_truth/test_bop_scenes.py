@@ -89,6 +89,7 @@ def test_missing_models_are_told(data_set: Path, tmp_path: Path) -> None:
         find_scenes(tmp_path / "alone")
 
 
+@pytest.mark.slow
 def test_eval_scores_them(data_set: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("point_cloud_utils")
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))

@@ -116,6 +116,7 @@ def test_eval_measures_it_in_its_workers(place):
     assert "sphere tight" in (place / "eval" / "report.md").read_text()
 
 
+@pytest.mark.slow
 def test_a_file_configures_it_everywhere(registered, place):
     path = place / "mine.toml"
     path.write_text('method = "sphere"\nshare = 0.5\n[surface]\nspacing = 0.004\n')
