@@ -2,7 +2,7 @@ import logging
 
 import pytest
 
-pytest_plugins = ["pointsdf_fixtures", "table_fixtures"]
+pytest_plugins = ["pointsdf_fixtures", "starter_fixtures", "table_fixtures"]
 
 
 @pytest.fixture(scope="session", autouse=True)

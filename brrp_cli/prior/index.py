@@ -83,9 +83,14 @@ def index_of(manifest: Manifest, digest: str) -> Index:
 
 
 def write_index(folder: Path, index: Index) -> None:
-    """Keep the index, unless the folder cannot be written: nothing but time is lost then."""
+    """Keep the index, unless it stands there already, or the folder cannot be written: nothing but
+    time is lost then."""
+    data, path = index.as_bytes(), folder / INDEX_FILE
     try:
-        write_bytes(folder / INDEX_FILE, index.as_bytes())
+        if not (path.is_file() and path.read_bytes() == data):
+            write_bytes(path, data)
+    except OSError as error:
+        log.info("%s cannot be read: %s", path, error.strerror)
     except OutputError as error:
         log.info("%s cannot be kept: %s", folder / INDEX_FILE, error.found)
 
