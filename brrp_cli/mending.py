@@ -11,9 +11,8 @@ from numpy.typing import NDArray
 
 from brrp_cli.config.segmentation import MendConfig
 from brrp_cli.frames.frame import Frame
-from brrp_cli.geometry import project, transform_points
+from brrp_cli.geometry import backproject, project, transform_points
 from brrp_cli.prior.store import Prior
-from brrp_cli.raycast import look
 from brrp_cli.reconstruction import Reconstruction, Retrieved
 from brrp_cli.segmentation.mend_masks import Mended, Placed, mend_masks
 
@@ -21,12 +20,17 @@ Again = Callable[[Frame, Collection[int]], Reconstruction]
 
 
 def mend(
-    result: Reconstruction, prior: Prior | None, again: Again, config: MendConfig
+    result: Reconstruction,
+    prior: Prior | None,
+    again: Again,
+    config: MendConfig,
+    first_free: int = 1,
 ) -> Reconstruction:
     """The reconstruction after recognised objects claimed masks that they explain and gave back
     pixels that they do not (segmentation/mend_masks.py), in `config.rounds` rounds at most.
 
-    again : reconstructs those objects of a frame whose ids are given
+    again : reconstructs those objects of a frame whose ids are given; first_free : ids of new
+    objects are this at least
     Its frame has the masks as they were mended; without a prior nothing is recognised and nothing
     changes. `seconds` gains "mending".
     """
@@ -35,7 +39,7 @@ def mend(
     start = time.perf_counter()
     first = dict(result.seconds)
     for _ in range(config.rounds):
-        mended = mended_masks(result, prior, config)
+        mended = mended_masks(result, prior, config, first_free)
         if mended.segmap is result.frame.segmap:
             break
         frame = replace(result.frame, segmap=mended.segmap)
@@ -48,7 +52,9 @@ def mend(
     return replace(result, seconds={**first, "mending": time.perf_counter() - start})
 
 
-def mended_masks(result: Reconstruction, prior: Prior, config: MendConfig) -> Mended:
+def mended_masks(
+    result: Reconstruction, prior: Prior, config: MendConfig, first_free: int = 1
+) -> Mended:
     """The frame's masks, mended by the objects that were recognised in it."""
     frame = result.frame
     placed = [
@@ -61,28 +67,26 @@ def mended_masks(result: Reconstruction, prior: Prior, config: MendConfig) -> Me
         noise = config.noise + config.noise_growth * depth**2
     tolerance = np.nan_to_num(config.sigmas * np.hypot(noise, config.pose))
     height = None if result.plane is None else result.plane.signed_distance(frame.points)
-    return mend_masks(frame.segmap, depth, placed, height, tolerance, config)
+    return mend_masks(frame.segmap, depth, placed, height, tolerance, config, first_free)
 
 
-def rendered(found: Retrieved, prior: Prior, frame: Frame) -> NDArray[np.float32]:
+def rendered(found: Retrieved, prior: Prior, frame: Frame) -> NDArray[np.float64]:
     """Depth (H, W), metres, of the stored object as it was placed and seen alone; 0 elsewhere."""
-    import trimesh
-
     assert found.T_cam_object is not None
     shape = prior.load(found.name).shape
     vertices = transform_points(found.T_cam_object, shape.vertices.astype(np.float64))
-    depth = np.zeros(frame.shape, dtype=np.float32)
+    depth = np.zeros(frame.shape)
     if (vertices[:, 2] <= 0).any():
         return depth
     # Only the window of the image that the object fills is looked into.
     pixels = project(vertices, frame.K)
     low = np.clip(np.floor(pixels.min(axis=0)).astype(int), 0, frame.shape[::-1])
     high = np.clip(np.ceil(pixels.max(axis=0)).astype(int) + 1, 0, frame.shape[::-1])
-    if (high <= low).any():
-        return depth
-    K = frame.K.copy()
-    K[:2, 2] -= low
-    mesh = trimesh.Trimesh(vertices, shape.faces, process=False)
-    sight = look([mesh], K, (int(high[1] - low[1]), int(high[0] - low[0])))
-    depth[low[1] : high[1], low[0] : high[0]] = sight.depth
+    window = (slice(low[1], high[1]), slice(low[0], high[0]))
+    if depth[window].size:
+        # Rays with z = 1 go as often as the depth is.
+        length, _ = shape.met(
+            found.T_cam_object, backproject(np.ones(frame.shape), frame.K)[window]
+        )
+        depth[window] = np.where(np.isfinite(length), length, 0.0)
     return depth

@@ -23,7 +23,7 @@ from brrp_cli.mending import mend
 from brrp_cli.methods.configuration import MethodConfig
 from brrp_cli.methods.registry import DEFAULT, reconstructing_method
 from brrp_cli.prior.store import Prior, open_prior
-from brrp_cli.reconstruction import ObjectReconstruction, Reconstruction
+from brrp_cli.reconstruction import Reconstruction
 from brrp_cli.tracking import Followed, first_frame, follow, unmoved
 
 if TYPE_CHECKING:
@@ -96,14 +96,15 @@ class Reconstructor:
         start = time.perf_counter()
         masked = frame if frame.object_ids else self._with_masks(frame)
         seconds = time.perf_counter() - start
-        result = self._tracked(masked) if self._track is not None else self._all(masked)
+        made = masked is not frame
+        if self._track is not None:
+            result = self._tracked(masked, mends=made)
+        else:
+            result = self._mended(self._all(masked)) if made else self._all(masked)
         result.seconds["masks"] = seconds
-        if masked is frame:
-            return result
-        result = mend(result, self._prior, self._all, self._segmentation.mend)
-        return replace(result, segmentation=asdict(self._segmentation))
+        return replace(result, segmentation=asdict(self._segmentation)) if made else result
 
-    def _tracked(self, frame: Frame) -> Reconstruction:
+    def _tracked(self, frame: Frame, *, mends: bool) -> Reconstruction:
         """All objects under the ids of their tracks; those that have not moved as they were."""
         assert self._track is not None
         start = time.perf_counter()
@@ -114,24 +115,36 @@ class Reconstructor:
         # Held to the frame that they were inferred from: what creeps is found in the end.
         for made, result in self._made:
             still = unmoved(made, seen, self._track)
-            kept += [each for each in result.reconstructed if each.object_id in still]
+            kept += [
+                replace(each, seconds={})
+                for each in result.reconstructed
+                if each.object_id in still
+            ]
         seconds = time.perf_counter() - start
         todo = set(seen.object_ids) - {item.object_id for item in kept}
         if todo or not self._made:
             result = self._all(seen, todo)
         else:
             result = replace(self._made[0][1], frame=seen, objects=[], seconds={})
-        made_before = self._only(kept)
-        self._made = [(seen, result), *made_before] if todo else made_before
-        objects = [*result.objects, *(replace(item, seconds={}) for item in kept)]
-        result = replace(result, objects=sorted(objects, key=lambda item: item.object_id))
+        objects = sorted([*result.objects, *kept], key=lambda item: item.object_id)
+        result = replace(result, objects=objects)
+        if mends:
+            result = self._mended(result, followed.next_id)
         result.seconds["tracking"] = seconds
-        self._last = followed
+        # Mending may have made anew what was kept.
+        was = {item.object_id: item for item in kept}
+        new = [item for item in result.objects if was.get(item.object_id) is not item]
+        left = self._only(was.keys() - {item.object_id for item in new})
+        self._made = [(result.frame, replace(result, objects=new)), *left] if new else left
+        next_id = max(followed.next_id, max(result.frame.object_ids) + 1)
+        self._last = Followed(result.frame, next_id)
         return result
 
-    def _only(self, kept: list[ObjectReconstruction]) -> list[tuple[Frame, Reconstruction]]:
-        """What was made of earlier frames, less what is not kept any more."""
-        ids = {item.object_id for item in kept}
+    def _mended(self, result: Reconstruction, first_free: int = 1) -> Reconstruction:
+        return mend(result, self._prior, self._all, self._segmentation.mend, first_free)
+
+    def _only(self, ids: Collection[int]) -> list[tuple[Frame, Reconstruction]]:
+        """What was made of earlier frames, of the objects `ids`."""
         left = [
             (frame, replace(made, objects=[o for o in made.objects if o.object_id in ids]))
             for frame, made in self._made

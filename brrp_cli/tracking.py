@@ -64,13 +64,16 @@ def camera_motion(last: Frame, frame: Frame, config: TrackConfig) -> NDArray[np.
         return None
     ground = (last.segmap == BACKGROUND) & (frame.segmap == BACKGROUND)
     both = ground & last.valid & frame.valid
-    if both.sum() < 0.2 * both.size:
+    if both.sum() < config.ground * both.size:
         return None
     apart = np.abs(last.points[both][:, 2] - frame.points[both][:, 2])
     # A camera that turns changes depth at every edge, one that slides along a table at few places.
     colour = np.abs(last.rgb[ground].astype(np.int16) - frame.rgb[ground]).mean()
-    same = np.median(apart) <= config.still and np.quantile(apart, 0.9) <= 5 * config.still
-    return np.eye(4) if same and colour <= config.colour / 4 else None
+    same = (
+        np.median(apart) <= config.still
+        and np.quantile(apart, 0.9) <= config.still_tail * config.still
+    )
+    return np.eye(4) if same and colour <= config.still_colour else None
 
 
 def _stands(T: NDArray[np.float64], config: TrackConfig) -> bool:

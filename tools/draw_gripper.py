@@ -74,7 +74,9 @@ def main() -> None:
     parser.add_argument("-o", "--output", type=Path, required=True)
     given = parser.parse_args()
     hand = open_gripper(given.gripper)
-    figure, (front, side) = plt.subplots(1, 2, figsize=(9, 4.6), width_ratios=[1.6, 1])
+    # Both views have one scale.
+    wide = [hand.palm_width * 1000 + 75, hand.palm_depth * 1000 + 60]
+    figure, (front, side) = plt.subplots(1, 2, figsize=(9, 4.6), width_ratios=wide)
     tip, palm, half = hand.tip * 1000, hand.palm_length * 1000, hand.opening * 500
     for ax, across in ((front, 0), (side, 1)):
         boxes(ax, hand, across)
@@ -103,8 +105,7 @@ def main() -> None:
     for ax, across in ((front, hand.palm_width), (side, hand.palm_depth)):
         ax.set_xlim(-across * 500 - 15, across * 500 + (60 if ax is front else 45))
         ax.set_ylim(tip + 28, -18)
-    figure.tight_layout()
-    figure.savefig(given.output, dpi=110)
+    figure.savefig(given.output, dpi=110, bbox_inches="tight")
 
 
 if __name__ == "__main__":

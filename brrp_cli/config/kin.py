@@ -19,21 +19,26 @@ class KinConfig:
     The shapes: of `objects` objects at most, evenly over the prior's names, in their `poses` most
     probable resting poses with a probability of `least_pose` or more. Coarse distances are kept at
     `nodes` nodes along each axis of the box, which they reach over by the factor `reach`;
-    `surface_points` of the surface stand for it.
+    `surface_points` of the surface stand for it. Its footprint's smallest rectangle is looked for
+    in `box_turns` steps of a quarter turn. Its share of hollow space is that of points halfway
+    between two of the surface which lie further outside than `hollow_clear`, over half its longest
+    side.
     What was seen: points in cells of `dense_cell` metres that hold a share `least_dense` of what
     the cell of a median point holds; `seen_points` of them at most, merged in cells of `cell`
-    metres, and
-    `free_points` of free space, from `free_gap` metres in front of the measured depth on, a share
-    `free_beside` of them in a ring of pixels about the silhouette, from the first of `ring` to the
-    second. Nearer to it a pixel may be anyone's. A share `at_edge` of those lies as deep as the
-    silhouette's next pixel, with a standard deviation of `edge` times the size. The surface stands
-    in free space where all pixels within `blur` pixels say so.
+    metres, and `free_points` of free space, from `free_gap` metres in front of the measured depth
+    on, a share `free_beside` of them in a ring of pixels about the silhouette, from the first of
+    `ring` to the second. Nearer to it a pixel may be anyone's. A share `at_edge` of those lies as
+    deep as the silhouette's next pixel, with a standard deviation of `edge` times the size. The
+    surface stands in free space where all pixels within `blur` pixels say so.
     First tries: every pose in `turns` turns. Sizes follow from the extents of what was seen,
     between the shares `most` of the points, `least_half` at least; sizes whose mean logarithm is
     beyond `most_size`, or of which one is off the mean by more than `most_stretch`, are left out.
-    They are held against `coarse_seen` observed and `coarse_free` free points, to `coarse_near`
-    metres. The best `starts` of them, at first `starts_each` of one object at most, take `steps`
-    Gauss-Newton steps with `step_seen` and `step_free` points, damped by a share `damping`.
+    They are held against `coarse_seen` observed and `coarse_free` free points: a Gaussian of
+    `coarse_near` metres, less `coarse_far_weight` times the distances, which end at `coarse_far`
+    times that, and `coarse_pull` times the prior. The best `starts` of them, at first `starts_each`
+    of one object at most, take `steps` Gauss-Newton steps with `step_seen` and `step_free` points,
+    damped by a share `damping`, of at most `step_turn` radians, `step_shift` metres, `step_size` of
+    a logarithm and `step_taper`; the taper, 1 of a cone to its tip, stays under `most_taper`.
     `sigma`, `free_sigma` : metres, standard deviations of the distances of seen points and of free
     ones inside of the shape, which count `free_pull` times; `robust` : metres, from which on points
     pull less (Geman and McClure); `pull` : weight of the prior, by which logarithms of sizes have
@@ -76,6 +81,7 @@ class KinConfig:
     edge: float = 0.05
     blur: int = 2
     turns: int = 8
+    box_turns: int = 90
     most: tuple[float, float] = (0.01, 0.99)
     least_half: float = 0.002
     most_size: float = 1.2
@@ -83,12 +89,20 @@ class KinConfig:
     coarse_seen: int = 80
     coarse_free: int = 60
     coarse_near: float = 0.006
+    coarse_far: float = 4.0
+    coarse_far_weight: float = 0.5
+    coarse_pull: float = share(0.25)
     starts: int = 48
     starts_each: int = 3
     steps: int = 8
     step_seen: int = 160
     step_free: int = 240
     damping: float = 0.02
+    step_turn: float = 0.35
+    step_shift: float = 0.03
+    step_size: float = 0.3
+    step_taper: float = 0.15
+    most_taper: float = share(0.6)
     sigma: float = 0.003
     robust: float = 0.009
     free_sigma: float = 0.003
@@ -112,6 +126,7 @@ class KinConfig:
     distinct_step: int = 4
     convincing: float = 0.42
     sharpness: float = 16.0
+    hollow_clear: float = 0.03
     hollow: tuple[float, float] = (0.4, 0.55)
     hollow_bonus: float = 0.3
     solid_most: float = share(0.45)

@@ -19,7 +19,10 @@ class TrackConfig:
     still : median of what depth has changed by, at most, on an object that has not moved; of the
         background the median of its size; noise : median of its size on such an object, at most;
         still_mask : IoU of its two masks, at least
-    still_camera : metres and radians by which poses of one camera that stands may differ
+    still_camera : metres and radians by which poses of one camera that stands may differ. Where no
+    pose is given, a camera stands if both images share a share `ground` of background with depth,
+    which has changed by `still` at most in the middle and `still_tail` times that in nine tenths of
+    it, and its colours by `still_colour`, of 255
     """
 
     overlap: float = share(0.3)
@@ -30,3 +33,6 @@ class TrackConfig:
     noise: float = 0.005
     still_mask: float = share(0.9)
     still_camera: float = 0.0005
+    ground: float = share(0.2)
+    still_tail: float = 5.0
+    still_colour: float = 10.0

@@ -182,7 +182,7 @@ class HypothesisPosterior:
             shares,
             HilbertPosterior.read(group, shared),
             np.asarray(group.attrs["box"], dtype=np.float64),
-            float(group.attrs.get("common", 0.0)),
+            float(group.attrs["common"]),
         )
 
 

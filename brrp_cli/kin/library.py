@@ -36,10 +36,8 @@ PARTS = (
 )
 # Libraries that are held in memory.
 HELD = 2
-# Of a quarter of a circle; normalised, of a sheet.
-TURNS, LEAST_HALF = 90, 1e-3
-# Normalised: a point that lies so far outside is not on the surface.
-CLEAR = 0.03
+# Normalised, of a sheet.
+LEAST_HALF = 1e-3
 
 _BUILDING = Lock()
 
@@ -195,7 +193,7 @@ def library_of(shapes: Sequence[KinShape], config: KinConfig) -> Library:
         origin,
         np.empty((0, 0, 4), np.float16),
         surface,
-        _hollow(fields, [each.surface for each in shapes])[of],
+        _hollow(fields, [each.surface for each in shapes], config.hollow_clear)[of],
         config.reach,
     )
     return replace(bare, coarse=_coarse(bare, config))
@@ -213,17 +211,17 @@ def _filled(values: NDArray[np.floating]) -> NDArray[np.floating]:
     return np.where(closed, -values, values)
 
 
-def _hollow(fields: Fields, surfaces: Sequence[Floats]) -> Floats:
+def _hollow(fields: Fields, surfaces: Sequence[Floats], clear: float) -> Floats:
     """(O,) of each shape: 0 of a convex one, about a half of a bowl."""
     found = np.empty(len(surfaces), np.float32)
     for number, surface in enumerate(surfaces):
         distance, _ = fields.distance_and_gradient(np.array([number]), surface.T[:, None])
         # In random order. Those deep inside belong to what is closed.
-        outer = surface[distance[0] > -CLEAR]
+        outer = surface[distance[0] > -clear]
         half = len(outer) // 2
         middle = ((outer[:half] + outer[half : 2 * half]) / 2).astype(np.float32)
         distance, _ = fields.distance_and_gradient(np.array([number]), middle.T[:, None])
-        found[number] = (distance > CLEAR).mean()
+        found[number] = (distance > clear).mean()
     return found
 
 
@@ -235,18 +233,18 @@ def _stances(shape: KinShape, config: KinConfig) -> Iterator[tuple[Array, Array,
     for number, rotation in enumerate(shape.rotations[: config.poses]):
         if number and shape.probabilities[number] < config.least_pose:
             break
-        turned = _rectangle_turn(points @ rotation.T[:, :2]) @ rotation
+        turned = _rectangle_turn(points @ rotation.T[:, :2], config.box_turns) @ rotation
         placed = points @ turned.T
         low, high = placed.min(axis=0), placed.max(axis=0)
         half, middle = np.maximum((high - low) / 2, LEAST_HALF), (high + low) / 2
         yield half, turned.T * half, turned.T @ middle, (placed[rows] - middle) / half
 
 
-def _rectangle_turn(points: Array) -> Array:
+def _rectangle_turn(points: Array, turns: int) -> Array:
     """(3, 3) turn about z after which the smallest rectangle about points (n, 2) lies along x and
     y."""
     hull = points[ConvexHull(points).vertices]
-    angles = np.linspace(0, np.pi / 2, TURNS, endpoint=False)
+    angles = np.linspace(0, np.pi / 2, turns, endpoint=False)
     along = np.stack([np.cos(angles), np.sin(angles)])
     first, second = hull @ along, hull @ np.stack([-along[1], along[0]])
     best = angles[np.argmin(np.ptp(first, axis=0) * np.ptp(second, axis=0))]

@@ -88,12 +88,15 @@ def _score(
     distance = coarse_distance(placements, np.concatenate([seen, free]), library)
     on, at = distance[:, : len(seen)], distance[:, len(seen) :]
     near = np.exp(-0.5 * (on / config.coarse_near) ** 2).mean(axis=1)
-    far = np.minimum(np.abs(on) / (4 * config.coarse_near), 1).mean(axis=1)
+    far = np.minimum(np.abs(on) / (config.coarse_far * config.coarse_near), 1).mean(axis=1)
     inside = np.clip(-at / config.coarse_near, 0, 1).sum(axis=1) / max(len(free), 1)
     log = np.log(placements.half / library.half[placements.stance])
     mean = log.mean(axis=1, keepdims=True)
     stretch = np.square(log - mean).sum(axis=1) / config.stretch_deviation**2
     size = np.square(mean[:, 0]) / config.size_deviation**2
     return np.asarray(
-        near - far / 2 - config.free_weight * inside - config.pull / 4 * (stretch + size)
+        near
+        - config.coarse_far_weight * far
+        - config.free_weight * inside
+        - config.coarse_pull * config.pull * (stretch + size)
     )

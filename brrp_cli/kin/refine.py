@@ -16,12 +16,8 @@ Array = NDArray[np.float64]
 
 # Turn, middle (3), logarithms of half (3), taper.
 UNKNOWNS = 8
-# A step of each at most: radians, metres, logarithms, a share.
-LARGEST = np.array([0.35, *[0.03] * 3, *[0.3] * 3, 0.15])
 # What no point sees, such as the turn of what is round, stays: far below any point's weight.
 LEAST = 1e-3
-# A cone to its tip has 1.
-MOST_TAPER = 0.6
 
 
 def refined(
@@ -46,7 +42,7 @@ def refined(
         diagonal = H[:, range(UNKNOWNS), range(UNKNOWNS)]
         H[:, range(UNKNOWNS), range(UNKNOWNS)] = diagonal * (1 + config.damping) + LEAST
         step = -np.asarray(np.linalg.solve(H, g[..., None])[..., 0], dtype=np.float64)
-        placements = _moved(placements, step)
+        placements = _moved(placements, step, config)
     return placements
 
 
@@ -102,12 +98,21 @@ def _prior(placements: Placements, library: Library, config: KinConfig) -> tuple
     return H, g
 
 
-def _moved(placements: Placements, step: Array) -> Placements:
-    step = np.clip(step, -LARGEST, LARGEST)
+def _moved(placements: Placements, step: Array, config: KinConfig) -> Placements:
+    largest = np.array(
+        [
+            config.step_turn,
+            *[config.step_shift] * 3,
+            *[config.step_size] * 3,
+            config.step_taper,
+        ]
+    )
+    step = np.clip(step, -largest, largest)
+    taper = np.clip(placements.taper + step[:, 7], -config.most_taper, config.most_taper)
     return Placements(
         placements.stance,
         (placements.turn + step[:, 0]).astype(np.float32),
         (placements.middle + step[:, 1:4]).astype(np.float32),
         (placements.half * np.exp(step[:, 4:7])).astype(np.float32),
-        np.clip(placements.taper + step[:, 7], -MOST_TAPER, MOST_TAPER).astype(np.float32),
+        taper.astype(np.float32),
     )

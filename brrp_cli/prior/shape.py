@@ -63,6 +63,22 @@ class StoredShape:
             np.minimum.at(least, corner, along)
         return 1 / np.maximum(least, 0.4)
 
+    def met(
+        self, T_cam_shape: NDArray[np.float64], rays: NDArray[np.floating]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """What rays (..., 3) from the camera meet first of the shape where T_cam_shape (4, 4), a
+        similarity, places it: how many times its own length each goes, inf where it misses, and
+        the surface's unit normal (..., 3) there, camera frame."""
+        o3d = import_open3d()
+        T_shape_cam = np.linalg.inv(T_cam_shape)
+        cast = np.empty((*rays.shape[:-1], 6), dtype=np.float32)
+        cast[..., :3] = T_shape_cam[:3, 3]
+        cast[..., 3:] = rays @ T_shape_cam[:3, :3].T
+        hits = self.scene.cast_rays(o3d.core.Tensor(cast), nthreads=1)
+        turn = T_cam_shape[:3, :3] / np.cbrt(np.linalg.det(T_cam_shape[:3, :3]))
+        normals = hits["primitive_normals"].numpy().astype(np.float64) @ turn.T
+        return hits["t_hit"].numpy().astype(np.float64), normals
+
     def signed_distance(self, points: NDArray[np.floating], band: float) -> NDArray[np.float64]:
         """Distance (n,) of points (n, 3), negative inside.
 

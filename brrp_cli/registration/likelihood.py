@@ -28,7 +28,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brrp_cli.config import ColourConfig, LikelihoodConfig
-from brrp_cli.dependencies import import_open3d
 from brrp_cli.frames.frame import Frame
 from brrp_cli.geometry import transform_points
 from brrp_cli.observation.pixel_noise import PixelNoise
@@ -159,7 +158,9 @@ def evidence(
 
     part = _window(T_cam_model, model, seen)
     rays, depth, own = seen.rays[part], seen.depth[part], seen.own[part]
-    rendered, lean = _render(T_cam_model @ model.T_model_object, model, rays)
+    # The rays have z = 1: how often they go is the depth itself.
+    rendered, normals = model.stored.shape.met(T_cam_model @ model.T_model_object, rays)
+    lean = np.abs(np.einsum("hwi,hwi->hw", normals, rays)) / np.linalg.norm(rays, axis=-1)
     hit = np.isfinite(rendered)
     near_hit = binary_dilation(hit, iterations=seen.bleed)
     with np.errstate(invalid="ignore"):
@@ -232,21 +233,6 @@ def _corners(model: Model) -> Array:
     return np.stack(np.meshgrid(*zip(low, high, strict=True), indexing="ij"), axis=-1).reshape(
         -1, 3
     )
-
-
-def _render(T_cam_shape: Array, model: Model, rays: Array) -> tuple[Array, Array]:
-    """Depth (h, w), metres, inf where nothing is hit, and cosine (h, w) between ray and normal."""
-    o3d = import_open3d()
-    T_shape_cam = np.linalg.inv(T_cam_shape)
-    cast = np.empty((*rays.shape[:2], 6), dtype=np.float32)
-    cast[..., :3] = T_shape_cam[:3, 3]
-    # The ray's length is the depth itself, as in the camera, since z = 1 there.
-    cast[..., 3:] = rays @ T_shape_cam[:3, :3].T
-    hits = model.stored.shape.scene.cast_rays(o3d.core.Tensor(cast), nthreads=1)
-    normal = hits["primitive_normals"].numpy().astype(np.float64) @ T_shape_cam[:3, :3]
-    length = np.linalg.norm(normal, axis=-1) * np.linalg.norm(rays, axis=-1)
-    lean = np.abs(np.einsum("hwi,hwi->hw", normal, rays)) / np.maximum(length, 1e-12)
-    return hits["t_hit"].numpy().astype(np.float64), lean
 
 
 def _patches(

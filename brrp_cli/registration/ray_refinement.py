@@ -78,21 +78,14 @@ def _ray_rows(
 
     A ray that misses the shape is held against its nearest point.
     """
-    o3d = import_open3d()
-    T_shape_cam = np.linalg.inv(T)
-    local = transform_points(T_shape_cam, points)
-    rays = np.concatenate([np.broadcast_to(T_shape_cam[:3, 3], local.shape), local], axis=1)
-    rays[:, 3:] -= rays[:, :3]
-    cast = shape.scene.cast_rays(o3d.core.Tensor(rays.astype(np.float32)), nthreads=1)
-    # Directions end at the points: a ray that ends on the surface meets it at 1.
-    length = cast["t_hit"].numpy().astype(np.float64)
-    normals = cast["primitive_normals"].numpy().astype(np.float64)
+    # Rays end at the points: one that ends on the surface goes once.
+    length, away = shape.met(T, points)
     met = np.isfinite(length)
     on_surface = points * np.where(met, length, 1.0)[:, None]
-    away = normals @ (T[:3, :3] / np.cbrt(np.linalg.det(T[:3, :3]))).T
     missed = np.flatnonzero(~met)
     if len(missed):
-        query = o3d.core.Tensor(local[missed].astype(np.float32))
+        local = transform_points(np.linalg.inv(T), points[missed])
+        query = import_open3d().core.Tensor(local.astype(np.float32))
         closest = shape.scene.compute_closest_points(query, nthreads=1)["points"].numpy()
         on_surface[missed] = transform_points(T, closest.astype(np.float64))
         apart = points[missed] - on_surface[missed]

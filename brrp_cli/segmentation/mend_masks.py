@@ -48,6 +48,7 @@ def mend_masks(
     height: NDArray[np.floating] | None,
     tolerance: NDArray[np.floating],
     config: MendConfig,
+    first_free: int = 1,
 ) -> Mended:
     """The masks after each placed object claimed what it explains and gave back what it does not.
 
@@ -58,7 +59,7 @@ def mend_masks(
     segmap : (H, W), 0 = background; depth : (H, W) metres, NaN = no return
     height : (H, W) metres above the support plane, None where there is none: what is given back and
     lies on it is background
-    tolerance : (H, W) metres
+    tolerance : (H, W) metres; first_free : what becomes an object of its own has this id at least
     """
     found = segmap.copy()
     seen = np.isfinite(depth) & (depth > 0)
@@ -74,7 +75,7 @@ def mend_masks(
         _claim(found, p, seen, explained[p.object_id], strongest, config)
     for p in trusted:
         if (found == p.object_id).any():
-            _give_back(found, p, seen, explained, height, tolerance, depth, config)
+            _give_back(found, p, seen, explained, height, tolerance, depth, first_free, config)
     changed = [
         int(i)
         for i in np.unique(found[found != BACKGROUND])
@@ -131,6 +132,7 @@ def _give_back(
     height: NDArray[np.floating] | None,
     tolerance: NDArray[np.floating],
     depth: NDArray[np.floating],
+    first_free: int,
     config: MendConfig,
 ) -> None:
     """Compact groups of pixels that the object cannot have become objects of their own, or
@@ -165,7 +167,7 @@ def _give_back(
         elif height is not None and float(np.nanmedian(height[pixels])) < config.table:
             found[pixels] = BACKGROUND
         else:
-            found[pixels] = found.max() + 1
+            found[pixels] = max(int(found.max()) + 1, first_free)
 
 
 def _differs(now: Mask, before: Mask, config: MendConfig) -> bool:

@@ -23,11 +23,12 @@ def seen(*meshes):
     return frame, [look([mesh], K, SHAPE).depth for mesh in meshes]
 
 
-def mended(segmap, frame, placed, config=None):
+def mended(segmap, frame, placed, config=None, first_free=1):
     noise = np.random.default_rng(0).normal(0, 0.001, SHAPE)
     depth = frame.points[..., 2] + noise
     height = TABLE.signed_distance(frame.points)
-    return mend_masks(segmap, depth, placed, height, np.full(SHAPE, 0.008), config or MendConfig())
+    config, tolerance = config or MendConfig(), np.full(SHAPE, 0.008)
+    return mend_masks(segmap, depth, placed, height, tolerance, config, first_free)
 
 
 def in_three(mask, ids):
@@ -79,6 +80,7 @@ def test_what_stands_on_a_recognised_thing_becomes_an_object():
     truth = frame.segmap == 2
     assert ((result.segmap == new) & truth).sum() > 0.8 * truth.sum()
     assert ((result.segmap == new) & ~truth).sum() < 0.05 * truth.sum()
+    assert max(mended(one, frame, [Placed(1, 0.9, box)], first_free=40).changed) == 40
 
 
 def test_what_two_explain_goes_to_the_one_that_explains_it():

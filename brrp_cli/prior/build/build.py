@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 import shutil
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -23,6 +22,7 @@ from brrp_cli.prior.build.mesh_files import input_sha256
 from brrp_cli.prior.build.output_folder import refuse_foreign
 from brrp_cli.prior.build.reuse import Finished, Reusable, reusable_objects
 from brrp_cli.prior.build.shard_plan import plan_shards, shard_file
+from brrp_cli.prior.build.sweep import sweep
 from brrp_cli.prior.index import index_of, write_index
 from brrp_cli.prior.manifest import (
     FILE,
@@ -41,8 +41,6 @@ from brrp_cli.stop import sigterm_raises, stopped
 
 # No mesh that ever gets done takes this long; pymeshlab can loop for ever on some.
 TIME_LIMIT = 900.0
-
-log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
@@ -264,7 +262,7 @@ class Run:
         # Now, so that not the first to open the prior pays for it.
         write_index(self.out, index)
         open_appearance_index(self.out, index, lambda: manifest)
-        _sweep(self.out, manifest)
+        sweep(self.out, manifest)
         names = {entry.name for entry in manifest.objects}
         return BuildReport(
             path=self.out,
@@ -346,28 +344,3 @@ def previous_manifest(out: Path) -> Manifest | None:
         raise
     except PriorError:
         return None
-
-
-def _sweep(out: Path, manifest: Manifest) -> None:
-    """Delete files that nothing refers to, and what killed runs left half written."""
-    appearance = out / manifest.appearance.file
-    listed = {out / shard.file for shard in manifest.shards}
-    listed |= {appearance, appearance.with_suffix(".npz")}
-    for path in [
-        *(out / "shards").glob("shard-*.h5"),
-        *(out / "shards").glob(".shard-*.partial.h5"),
-        *out.glob("appearance-*.np[yz]"),
-        *out.glob(".appearance-*.partial.np[yz]"),
-    ]:
-        if path not in listed:
-            _delete(path)
-    for path in out.glob(".manifest.*.partial.*"):
-        _delete(path)
-
-
-def _delete(path: Path) -> None:
-    """The prior is whole without it: what cannot be deleted is a line of `brrp verify`."""
-    try:
-        path.unlink(missing_ok=True)
-    except OSError as error:
-        log.warning("%s cannot be deleted: %s", path, error.strerror)

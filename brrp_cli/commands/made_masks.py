@@ -1,0 +1,60 @@
+"""Masks that `brrp reconstruct` makes on the way, and their picture beside the results."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from shlex import quote
+from typing import TYPE_CHECKING
+
+from brrp_cli.commands.frame import refuse_existing
+from brrp_cli.progress import note
+
+if TYPE_CHECKING:
+    from brrp_cli.commands.source_options import SourceOptions
+    from brrp_cli.config.segmentation import SegmentConfig
+    from brrp_cli.frames.frame import Frame
+
+
+def make_masks(
+    source: SourceOptions,
+    frame: Frame,
+    output: Path,
+    seed: int,
+    config: SegmentConfig,
+    *,
+    overwrite: bool,
+) -> Frame:
+    """The frame with masks made on the way; a picture of them is written beside the output."""
+    from brrp_cli.frames.build import require_objects
+    from brrp_cli.segmentation.mask_picture import write_picture
+
+    if source.masks is not None:
+        return require_objects(frame)
+    picture = output.with_name(output.name + ".masks.png")
+    refuse_existing([picture], overwrite)
+    frame = require_objects(source.make_masks(frame, seed, config))
+    write_picture(frame, picture)
+    how = f"the prompt {source.prompt!r}" if source.prompt else "what stands on the table"
+    note(f"Masks: made on the way from {how}, {len(frame.object_ids)} objects: {picture}")
+    note(
+        f"  to correct them: brrp segment {quote(str(output / 'frame.npz'))} --merge 1,2 --split 3"
+        " --drop 4 -o NEW.npz"
+    )
+    return frame
+
+
+def tell_mended(before: Frame, after: Frame, output: Path) -> None:
+    """Where recognised objects mended the masks, say so and draw them again."""
+    import numpy as np
+
+    from brrp_cli.segmentation.mask_picture import write_picture
+
+    if np.array_equal(before.segmap, after.segmap):
+        return
+    picture = output.with_name(output.name + ".masks.png")
+    write_picture(after, picture)
+    pixels = int((before.segmap != after.segmap).sum())
+    note(
+        f"Masks: mended by recognised objects in {pixels} pixels,"
+        f" {len(before.object_ids)} objects before, {len(after.object_ids)} after: {picture}"
+    )
