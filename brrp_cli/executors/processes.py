@@ -13,6 +13,7 @@ from collections.abc import Callable, Generator, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, TimeoutError, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
+from multiprocessing.util import is_exiting
 from pathlib import Path
 from typing import Any
 
@@ -118,7 +119,23 @@ def cannot_start(found: object) -> BrrpError:
 def _pool(workers: int) -> Any:
     import pebble
 
-    return pebble.ProcessPool(workers, context=multiprocessing.get_context("spawn"))
+    context = multiprocessing.get_context("spawn")
+    return pebble.ProcessPool(workers, initializer=_end_once, context=context)
+
+
+def _end_once() -> None:
+    """In the worker: once it ends, no signal to end cuts that short.
+
+    Pebble closes a worker's pipe, at which it ends by itself, and sends SIGTERM at the same time.
+    What is cut short leaves its named semaphores (tqdm makes one) for Python to complain of.
+    """
+    end: Any = signal.getsignal(signal.SIGTERM)
+
+    def end_unless_ending(number: int, where: Any) -> None:
+        if not is_exiting():
+            end(number, where)
+
+    signal.signal(signal.SIGTERM, end_unless_ending)
 
 
 def _stop(pool: Any) -> None:
