@@ -208,6 +208,8 @@ def _is_done(folder: Path, settings: dict[str, Any]) -> bool:
     found = {key: record.get(key) for key in settings}
     found["prior"] = prior.get("digest") if isinstance(prior, dict) else None
     wanted = json.loads(json.dumps(settings))
+    if found["segmentation"] is None:  # its masks came with it
+        found["segmentation"] = wanted["segmentation"]
     different = [key for key in settings if found[key] != wanted[key]]
     if different:
         raise OutputError(
@@ -221,7 +223,8 @@ def _is_done(folder: Path, settings: dict[str, Any]) -> bool:
 
 
 def _shown(settings: dict[str, Any], keys: list[str]) -> str:
-    return ", ".join(key if key == "config" else f"{key} {settings[key]}" for key in keys)
+    tables = ("config", "segmentation")
+    return ", ".join(key if key in tables else f"{key} {settings[key]}" for key in keys)
 
 
 def write_summary(work: Work, output: Path, told: list[dict[str, Any]]) -> None:

@@ -284,6 +284,7 @@ def command(
                 "retriever": None if retrieval is None else retrieval.name,
                 "prior": None if prior is None else prior.digest,
                 "config": as_record(config),
+                "segmentation": asdict(mask_config),
             }
             work = Work(source, with_masks, one, settings, overwrite=overwrite)
             failed = run_many(work, frames, output, report)

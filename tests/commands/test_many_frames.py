@@ -4,16 +4,20 @@ from __future__ import annotations
 
 import json
 import shutil
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from click.testing import CliRunner, Result
+from made_result import write_made_result
 from sphere_method import METHOD
 from table_scene import T_CAM_WORLD, in_camera, photograph
 
 from brrp_cli.cli import main
+from brrp_cli.commands.many_frames import _is_done
+from brrp_cli.config.segmentation import SegmentConfig
+from brrp_cli.errors import OutputError
 from brrp_cli.frames.npz import load_frame, save_frame
 from brrp_cli.methods.registry import METHODS
 from brrp_cli.shapes import solids
@@ -80,6 +84,21 @@ def test_every_frame_has_a_folder_and_what_fails_ends_nothing(source, tmp_path):
     replaced = run(source, "--frames", "0:1", "-o", out, "--seed", 1, "--overwrite")
     assert replaced.exit_code == 0, replaced.output
     assert json.loads((out / "f0.npz" / "result.json").read_text())["seed"] == 1
+
+
+def test_masks_that_were_made_otherwise_are_other_settings(tmp_path):
+    folder = write_made_result(tmp_path / "out")
+    record = json.loads((folder / "result.json").read_text())
+    settings = {key: record[key] for key in ("method", "seed", "frame", "retriever", "config")}
+    settings |= {"prior": record["prior"]["digest"], "segmentation": asdict(SegmentConfig())}
+
+    def with_masks(made):
+        (folder / "result.json").write_text(json.dumps(record | {"segmentation": made}))
+        return _is_done(folder, settings)
+
+    assert with_masks(None) and with_masks(settings["segmentation"])
+    with pytest.raises(OutputError, match="other settings"):
+        with_masks(settings["segmentation"] | {"table": {}})
 
 
 def test_a_range_chooses_and_json_tells_each_frame(source, tmp_path):
