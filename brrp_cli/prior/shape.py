@@ -89,9 +89,17 @@ class StoredShape:
         distance = self.field.signed_distance(points)
         near = np.flatnonzero(np.abs(distance) < band + self.field.spacing * np.sqrt(3))
         if len(near):
-            o3d = import_open3d()
-            query = o3d.core.Tensor(np.ascontiguousarray(points[near], dtype=np.float32))
-            exact = self.scene.compute_distance(query, nthreads=1).numpy()
-            inside = self.scene.compute_occupancy(query, nthreads=1, nsamples=RAYS).numpy() > 0.5
-            distance[near] = np.where(inside, -exact, exact)
+            distance[near] = self.nearest(points[near])[0]
         return distance
+
+    def nearest(
+        self, points: NDArray[np.floating]
+    ) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+        """Exact distance (n,) of points (n, 3), negative inside, and the nearest face (n,)."""
+        o3d = import_open3d()
+        query = o3d.core.Tensor(np.ascontiguousarray(points, dtype=np.float32))
+        closest = self.scene.compute_closest_points(query, nthreads=1)
+        apart = closest["points"].numpy().astype(np.float64) - points
+        inside = self.scene.compute_occupancy(query, nthreads=1, nsamples=RAYS).numpy() > 0.5
+        distance = np.where(inside, -1.0, 1.0) * np.linalg.norm(apart, axis=1)
+        return distance, closest["primitive_ids"].numpy().astype(np.int64)

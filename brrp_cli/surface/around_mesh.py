@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brrp_cli.config import SurfaceConfig
-from brrp_cli.dependencies import import_open3d
 from brrp_cli.geometry import transform_points
 from brrp_cli.inference.placed_shape import PlacedShape
 from brrp_cli.reconstruction import Axes
@@ -37,18 +36,17 @@ def beyond_reach(shape: PlacedShape, reach: Array, axes: Axes, further: float) -
     reach : (n,) metres by which the region goes beyond each vertex, outwards; that of a face is the
     largest of its corners
     """
-    o3d = import_open3d()
     nodes = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
+    local = transform_points(np.linalg.inv(shape.T_cam_shape), nodes)
     spacing = float(axes[0][1] - axes[0][0])
     band = max(float(np.abs(reach).max()), 0.0) + further + 2 * spacing
-    distance = shape.signed_distance(nodes, band)
-    beyond = np.where(distance < 0, -spacing, distance)
-    near = np.flatnonzero(np.abs(distance) < band)
-    local = transform_points(np.linalg.inv(shape.T_cam_shape), nodes[near])
-    query = o3d.core.Tensor(np.ascontiguousarray(local, dtype=np.float32))
-    face = shape.shape.scene.compute_closest_points(query, nthreads=1)["primitive_ids"].numpy()
-    corners = shape.shape.faces[face.astype(np.int64)]
-    beyond[near] = distance[near] - reach[corners].max(axis=1)
+    field = shape.shape.field
+    coarse = field.signed_distance(local)
+    beyond = np.where(coarse < 0, -spacing, coarse * shape.unit)
+    near = np.flatnonzero(np.abs(coarse) < band / shape.unit + field.spacing * np.sqrt(3))
+    distance, face = shape.shape.nearest(local[near])
+    corners = shape.shape.faces[face]
+    beyond[near] = distance * shape.unit - reach[corners].max(axis=1)
     return np.asarray(beyond.reshape([len(axis) for axis in axes]))
 
 
