@@ -157,6 +157,7 @@ def test_report_plots_and_pictures_are_written(first):
     assert "a_brrp_paper_k1_truth.png" in pictures and "b_vprism.png" in pictures
 
 
+@pytest.mark.slow
 def test_a_killed_run_goes_on_and_gives_the_same_numbers(place, first):
     folder, _ = first
     again = place / "killed"

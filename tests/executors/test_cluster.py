@@ -110,6 +110,7 @@ def test_a_scheduler_file_serves_as_an_address(address: str, tmp_path: Path) -> 
         pass
 
 
+@pytest.mark.slow
 def test_a_scheduler_that_goes_away_is_told(tmp_path: Path) -> None:
     with (
         LocalCluster(1, dashboard_address=":0", silence_logs=60) as started,

@@ -104,6 +104,7 @@ def test_a_posterior_of_a_method_that_is_not_registered_is_refused(out):
     assert error.value.found == "sphere" and "vprism" in error.value.expected
 
 
+@pytest.mark.slow
 def test_eval_measures_it_in_its_workers(place):
     options = ["--method", "sphere", "--preset", "tight,half", "--workers", 1, "-o", place / "eval"]
     done = command(place, "eval", place / "scenes", "--data-root", place / "data", *options)

@@ -1,9 +1,9 @@
-"""What several tests share: examples of one scene, and a network that has learnt them."""
+"""What several tests share: examples of one scene, and networks that have learnt them."""
 
 from __future__ import annotations
 
 import os
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from shutil import copyfile
 
@@ -15,7 +15,8 @@ from training.examples import Examples, Recipe, scene_examples
 
 from brrp_cli.ground_truth.scenes import Scene
 
-STEPS, RATE = 350, 1e-2
+# By heart, and enough to give each of them a surface.
+STEPS, FEW_STEPS, RATE = 350, 60, 1e-2
 
 
 @dataclass(frozen=True)
@@ -47,22 +48,32 @@ def place(tmp_path_factory) -> Place:
 
 
 @pytest.fixture(scope="session")
-def learnt(place, tmp_path_factory) -> Place:
-    """The same after a training that has learnt the eight by heart, once for all workers."""
-    shared = place.weights
-    if "PYTEST_XDIST_WORKER" in os.environ:
-        shared = tmp_path_factory.getbasetemp().parent / place.weights.name
-    with FileLock(shared.with_suffix(".lock")):
-        if not shared.is_file():
-            train(place)
-            if shared != place.weights:
-                place.weights.rename(shared)
-    if shared != place.weights:
-        copyfile(shared, place.weights)
+def trained(place) -> Place:
+    """The same after a short training."""
+    train(place, FEW_STEPS)
     return place
 
 
-def train(place: Place) -> None:
+@pytest.fixture(scope="session")
+def learnt(place, tmp_path_factory) -> Place:
+    """The same after a training that has learnt the eight by heart, which takes long: once for all
+    workers."""
+    found = replace(place, weights=place.folder / "by_heart" / place.weights.name)
+    found.weights.parent.mkdir()
+    shared = found.weights
+    if "PYTEST_XDIST_WORKER" in os.environ:
+        shared = tmp_path_factory.getbasetemp().parent / found.weights.name
+    with FileLock(shared.with_suffix(".lock")):
+        if not shared.is_file():
+            train(found, STEPS)
+            if shared != found.weights:
+                found.weights.rename(shared)
+    if shared != found.weights:
+        copyfile(shared, found.weights)
+    return found
+
+
+def train(place: Place, steps: int) -> None:
     """All of the eight in every step."""
     from training.pointsdf import Training, TrainingConfig
 
@@ -72,9 +83,9 @@ def train(place: Place) -> None:
     about = {"name": "eight"}
     training = Training(NETWORK, config, place.folder, place.weights, about)
     eight = np.arange(8)
-    for number in range(STEPS):
+    for number in range(steps):
         # Falling to 0, so that few steps suffice.
-        training.optimizer.param_groups[0]["lr"] = RATE * (1 - number / STEPS)
+        training.optimizer.param_groups[0]["lr"] = RATE * (1 - number / steps)
         training.step(place.examples, eight, number)
     training.settle(place.examples, [eight] * 16)
     save_weights(training.network, about, place.weights, half=True)

@@ -96,6 +96,7 @@ def test_uncertainty_of_the_surface_is_its_spread(ball):
     np.testing.assert_allclose(ball.uncertainty(on_ball(RADIUS)), 0.25, atol=1e-3)
 
 
+@pytest.mark.slow
 def test_objects_learnt_by_heart_are_reconstructed(learnt):
     """Through the method: the frame's own clouds, against the true meshes on a fresh grid."""
     scene = learnt.scenes[0]
@@ -112,10 +113,10 @@ def test_objects_learnt_by_heart_are_reconstructed(learnt):
     assert np.mean(ious) > 0.85, dict(zip(MESHES, ious, strict=True))
 
 
-def test_one_object_is_answered_as_among_others(learnt):
+def test_one_object_is_answered_as_among_others(trained):
     """All clouds are encoded together, and none changes another's answer."""
-    frame = learnt.scenes[0].view(0)
-    network = load_weights(learnt.weights).network
+    frame = trained.scenes[0].view(0)
+    network = load_weights(trained.weights).network
     alone = replace(frame, segmap=np.where(frame.segmap == 4, 4, 0))
     (one,) = reconstruct_pointsdf(alone, network, PointSDFConfig())
     among = reconstruct_pointsdf(frame, network, PointSDFConfig())[3]
@@ -125,8 +126,8 @@ def test_one_object_is_answered_as_among_others(learnt):
     )
 
 
-def test_objects_with_too_few_points_say_so(learnt):
-    frame = learnt.scenes[0].view(0)
+def test_objects_with_too_few_points_say_so(trained):
+    frame = trained.scenes[0].view(0)
     segmap = np.zeros_like(frame.segmap)
     rows, columns = np.nonzero(frame.segmap == 4)
     segmap[rows[:5], columns[:5]] = 9
@@ -139,9 +140,9 @@ def test_objects_with_too_few_points_say_so(learnt):
     assert reconstruct_pointsdf(nothing, network, PointSDFConfig()) == []
 
 
-def test_a_kept_posterior_answers_without_the_weights(learnt, tmp_path):
-    frame = learnt.scenes[0].view(0)
-    found = reconstruct_pointsdf(frame, load_weights(learnt.weights).network, PointSDFConfig())
+def test_a_kept_posterior_answers_without_the_weights(trained, tmp_path):
+    frame = trained.scenes[0].view(0)
+    found = reconstruct_pointsdf(frame, load_weights(trained.weights).network, PointSDFConfig())
     path = tmp_path / "posterior.h5"
     save_posteriors({item.object_id: item.posterior for item in found}, path)
     kept = open_posterior(path)

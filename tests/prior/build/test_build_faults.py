@@ -134,7 +134,9 @@ def usable(out: Path, whole: list[Path]) -> None:
 EVERY = pytest.mark.parametrize(
     ("every", "chunk"), [(3, 16384), pytest.param(1, 4096, marks=pytest.mark.long)]
 )
-OVER = pytest.mark.parametrize("over", [False, True], ids=["new", "over another"])
+OVER = pytest.mark.parametrize(
+    "over", [False, pytest.param(True, marks=pytest.mark.slow)], ids=["new", "over another"]
+)
 
 
 @OVER

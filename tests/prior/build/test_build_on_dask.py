@@ -69,6 +69,7 @@ def test_a_cluster_makes_the_same_bytes_while_its_workers_are_killed(
     assert "distributed" not in capfd.readouterr().err
 
 
+@pytest.mark.slow
 def test_what_was_finished_when_the_cluster_was_lost_is_kept(
     boxes: Path, wanted: dict[str, bytes], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

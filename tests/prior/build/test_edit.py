@@ -77,6 +77,7 @@ def test_added_objects_alone_are_made(places: dict[str, Path], prior: Path) -> N
     assert verify_prior(open_prior(prior)) == []
 
 
+@pytest.mark.slow
 def test_files_are_added_one_by_one(places: dict[str, Path], prior: Path) -> None:
     add_objects(prior, [places["b"] / "ae.ply", places["b"] / "bad.obj"], workers=1)
     add_objects(prior, [places["b"] / "aa.ply"], workers=1)

@@ -104,6 +104,7 @@ def test_a_changed_texture_is_a_changed_mesh(tmp_path: Path) -> None:
     assert input_sha256(path) != bare
 
 
+@pytest.mark.slow
 def test_a_changed_texture_makes_its_object_anew_and_no_other(tmp_path: Path) -> None:
     folder = tmp_path / "meshes"
     folder.mkdir()
