@@ -13,7 +13,7 @@ from typing import Any
 from brrp_cli.config.baselines import CoarseToFineConfig, PointSDFConfig, VPrismConfig
 from brrp_cli.config.inference import CompletionConfig, FittedMapConfig, InferenceConfig, MeanConfig
 from brrp_cli.config.kin import KinConfig
-from brrp_cli.config.observation import ObservationConfig, SensorConfig
+from brrp_cli.config.observation import ObservationConfig, SensorConfig, StrayConfig
 from brrp_cli.config.registration import (
     ColourConfig,
     FeatureConfig,
@@ -48,6 +48,7 @@ __all__ = [
     "RetrievalConfig",
     "SearchConfig",
     "SensorConfig",
+    "StrayConfig",
     "SurfaceConfig",
     "VPrismConfig",
     "VerificationConfig",
@@ -60,6 +61,7 @@ __all__ = [
 class HypothesesConfig:
     """What takes the place of the scale scan and of the fixed grid of hinge points."""
 
+    strays: StrayConfig = field(default_factory=StrayConfig)
     search: SearchConfig = field(default_factory=SearchConfig)
     refine: RayRefinementConfig = field(default_factory=RayRefinementConfig)
     likelihood: LikelihoodConfig = field(default_factory=LikelihoodConfig)

@@ -37,6 +37,20 @@ class ObservationConfig:
 
 
 @dataclass(frozen=True)
+class StrayConfig:
+    """Pixels of a mask that are not its object's (observation/strays.py).
+
+    link : metres between the depths of neighbouring pixels of one piece, and of scraps from the
+        object; reach : metres in depth between the object and its other pieces; share : of the
+        pixels of the largest piece, which one that is no scrap has
+    """
+
+    link: float = 0.02
+    reach: float = 0.1
+    share: float = share(0.02)
+
+
+@dataclass(frozen=True)
 class SensorConfig:
     """How far measured depth errs: a standard deviation of noise + noise_growth * depth^2, metres.
 

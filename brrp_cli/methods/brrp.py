@@ -27,6 +27,7 @@ def run(frame: Frame, setup: Setup) -> Reconstruction:
     from brrp_cli.observation.pixel_noise import pixel_noise
     from brrp_cli.observation.ray_samples import observe
     from brrp_cli.observation.sensor_noise import wave_deviation
+    from brrp_cli.observation.strays import without_strays
     from brrp_cli.progress import progress
     from brrp_cli.reconstruction import Reconstruction
     from brrp_cli.retrieval.checked import CheckedRetriever
@@ -38,6 +39,9 @@ def run(frame: Frame, setup: Setup) -> Reconstruction:
     retriever = CheckedRetriever(setup.retriever, len(prior.names))
     workers = setup.workers or cores()
     start = time.perf_counter()
+    given = frame
+    if config.hypotheses is not None:
+        frame = without_strays(frame, config.hypotheses.strays)
     scene = observe(frame, config.observation, seed, workers)
     if config.hypotheses is not None:
         wave = wave_deviation(frame, scene.plane, config.hypotheses.sensor)
@@ -69,7 +73,7 @@ def run(frame: Frame, setup: Setup) -> Reconstruction:
 
     ids = [i for i in frame.object_ids if setup.only is None or i in setup.only]
     return Reconstruction(
-        frame=frame,
+        frame=given,
         objects=list(progress(in_threads(whole, ids, workers), "objects", len(ids))),
         plane=scene.plane,
         method=METHOD.name,

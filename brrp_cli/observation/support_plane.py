@@ -39,7 +39,9 @@ def fit_plane(
     The plane of the largest consensus is fitted again, by least squares, to all of its inliers.
 
     points : (n, 3) background points, metres, camera frame, finite
-    toward : (3,) the scene's centre; the normal is turned to its side
+    toward : (3,) the scene's centre
+    The normal is turned to the camera: what is seen of a plane faces it. The scene's centre may lie
+    below a table whose masks hold smeared pixels or things on the floor.
     Returns None where fewer than `config.plane_min_points` points are near or agree on a plane.
     """
     near = points[np.linalg.norm(points - toward, axis=-1) < config.plane_radius]
@@ -56,9 +58,10 @@ def fit_plane(
     )
     if model is None:
         return None
-    if model[3] < 0:  # the scene's centre is the origin here
-        model = -model
-    return Plane(normal=model[:3].copy(), offset=float(model[3] - model[:3] @ toward))
+    offset = float(model[3] - model[:3] @ toward)
+    if offset < 0:
+        model, offset = -model, -offset
+    return Plane(normal=model[:3].copy(), offset=offset)
 
 
 def largest_plane(

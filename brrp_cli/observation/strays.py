@@ -1,0 +1,96 @@
+"""Pixels of a mask whose depth is not that of its object: what lies far behind it, or before it."""
+
+from __future__ import annotations
+
+import logging
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+
+from brrp_cli.config.observation import StrayConfig
+from brrp_cli.frames.frame import Frame
+
+log = logging.getLogger(__name__)
+
+
+def without_strays(frame: Frame, config: StrayConfig) -> Frame:
+    """The frame, with no depth at pixels that their mask holds by mistake.
+
+    Masks that are a pixel too wide hold what stands behind the object, and cameras mix the depths
+    of both. One such pixel moves the middle of the object's bounding box by half its distance.
+    """
+    stray = np.zeros(frame.shape, dtype=bool)
+    for object_id in frame.object_ids:
+        own = frame.valid & (frame.segmap == object_id)
+        if own.any():
+            rows, columns = np.nonzero(own)
+            window = np.s_[rows.min() : rows.max() + 1, columns.min() : columns.max() + 1]
+            depth = np.where(own[window], frame.points[..., 2][window], np.nan)
+            found = stray_pixels(depth, config)
+            stray[window] |= found
+            if found.any():
+                log.info(
+                    "Object %d: %d pixels of its mask are far from it and left out",
+                    object_id,
+                    found.sum(),
+                )
+    if not stray.any():
+        return frame
+    return replace(frame, points=np.where(stray[..., None], np.float32(np.nan), frame.points))
+
+
+def stray_pixels(depth: NDArray[np.floating], config: StrayConfig) -> NDArray[np.bool_]:
+    """(H, W) bool: pixels whose depth is not that of the object.
+
+    Neighbours whose depths differ by less than `config.link` hang together. The largest piece is
+    the object's; so are pieces of a good size within `config.reach` of its range of depths, which
+    grows by them, and scraps within `config.link` of that range.
+
+    depth : (H, W) metres, NaN outside the object's mask and where there is no return
+    """
+    own = np.isfinite(depth)
+    piece, count = _pieces(depth, own, config.link)
+    values = depth[own].astype(np.float64)
+    size = np.bincount(piece, minlength=count)
+    nearest, farthest = np.full(count, np.inf), np.full(count, -np.inf)
+    np.minimum.at(nearest, piece, values)
+    np.maximum.at(farthest, piece, values)
+    body = int(size.argmax())
+    large = size >= config.share * size[body]
+    low, high = nearest[body], farthest[body]
+    while True:
+        kept = large & (farthest >= low - config.reach) & (nearest <= high + config.reach)
+        wider = nearest[kept].min(), farthest[kept].max()
+        if wider == (low, high):
+            break
+        low, high = wider
+    kept |= (farthest >= low - config.link) & (nearest <= high + config.link)
+    stray = np.zeros(depth.shape, dtype=bool)
+    stray[own] = ~kept[piece]
+    return stray
+
+
+def _pieces(
+    depth: NDArray[np.floating], own: NDArray[np.bool_], link: float
+) -> tuple[NDArray[np.int64], int]:
+    """The piece (n,) of each own pixel, row by row, and how many there are."""
+    number = np.full(depth.shape, -1)
+    number[own] = np.arange(own.sum())
+    ends = []
+    for a, b in (
+        (np.s_[:, 1:], np.s_[:, :-1]),
+        (np.s_[1:], np.s_[:-1]),
+        (np.s_[1:, 1:], np.s_[:-1, :-1]),
+        (np.s_[1:, :-1], np.s_[:-1, 1:]),
+    ):
+        with np.errstate(invalid="ignore"):
+            linked = np.abs(depth[a] - depth[b]) < link
+        ends.append((number[a][linked], number[b][linked]))
+    first, second = (np.concatenate(each) for each in zip(*ends, strict=True))
+    nodes = int(own.sum())
+    graph = coo_array((np.ones(len(first), dtype=bool), (first, second)), shape=(nodes, nodes))
+    count, piece = connected_components(graph, directed=False)
+    return np.asarray(piece, dtype=np.int64), int(count)
