@@ -51,11 +51,15 @@ class KinConfig:
     observed points further than `lost` metres away. All points move the best `kept` fits once more.
     Hypotheses: of the best `kept` fits the best `hypotheses` that lie `distinct` metres apart, at
     every `distinct_step`-th point. Their weight is a logistic function of the best score, a half at
-    `convincing`, with the slope `sharpness`; of a shape whose share of hollow space reaches from
-    the first to the second of `hollow`, a half by up to `hollow_bonus` earlier, and one that is
-    solid weighs `solid_most` at most: of solids the completion is as good, and their mean is better
-    than either; and less where fewer than `many_seen` cells were seen, none below `least_seen`;
-    what weighs less than `least_share` is left out. The logit is the distance over `width` metres,
+    `convincing`, with the slope `sharpness`. Of a hollow shape, whose share of hollow space reaches
+    from the first to the second of `hollow`, it is a half at a score up to `hollow_bonus` lower; up
+    to `opening_bonus` lower where the camera looks into the object: where a share `opening_share`
+    of what was seen reaches from the first to the second of `opening`, over its longest extent,
+    behind the near side of its convex hull. A solid shape weighs `solid_most` at most: of solids
+    the completion is as good, and their mean is better than either. All weigh less where fewer
+    than `many_seen` cells were seen, nothing below `least_seen`; what weighs less than
+    `least_share` is left out.
+    The logit is the distance over `width` metres,
     which grows by `doubt` for each unit that the mean Gaussian falls short of `sure`, and of hollow
     shapes is exact to `exact` metres; distances are kept on `field_nodes` nodes up to `margin`
     metres around.
@@ -127,8 +131,11 @@ class KinConfig:
     convincing: float = 0.42
     sharpness: float = 16.0
     hollow_clear: float = 0.03
-    hollow: tuple[float, float] = (0.4, 0.55)
-    hollow_bonus: float = 0.3
+    hollow: tuple[float, float] = (0.5, 0.58)
+    hollow_bonus: float = 0.05
+    opening_share: float = share(0.9)
+    opening: tuple[float, float] = (0.15, 0.19)
+    opening_bonus: float = 0.7
     solid_most: float = share(0.45)
     many_seen: int = 250
     least_seen: int = 40

@@ -14,6 +14,7 @@ from brrp_cli.inference.placed_shape import PlacedShape
 from brrp_cli.kin.evidence import Evidence, gather
 from brrp_cli.kin.fit import Fits, fit_kin
 from brrp_cli.kin.library import Library, kin_library
+from brrp_cli.kin.opening import opening
 from brrp_cli.kin.placement import distance_and_slopes
 from brrp_cli.kin.stretched import pose, stretched
 from brrp_cli.observation.support_plane import Plane
@@ -58,7 +59,8 @@ def kin_hypotheses(
     fits = fit_kin(evidence, library, kin)
     rows = _distinct(fits, library, kin)
     hollow = library.hollow[fits.placements.stance[rows]]
-    shares = kin_shares(fits.score[rows], hollow, len(evidence.seen), kin)
+    into = opening(evidence.seen, evidence.eye, kin.opening_share)
+    shares = kin_shares(fits.score[rows], hollow, len(evidence.seen), into, kin)
     limit = config.mean.limit
     return [
         _hypothesis(int(row), float(share), fits, evidence, library, prior, limit, kin)
@@ -68,18 +70,26 @@ def kin_hypotheses(
 
 
 def kin_shares(
-    score: NDArray[np.floating], hollow: NDArray[np.floating], seen: int, config: KinConfig
+    score: NDArray[np.floating],
+    hollow: NDArray[np.floating],
+    seen: int,
+    into: float,
+    config: KinConfig,
 ) -> Array:
     """Shares (k,) of fits with scores (k,), best first: that of all of them follows from the best
     one's, that of each from its distance to it.
 
     hollow : (k,) of each shape; the completion is worse at walls than at solids
     seen : observed points; of few of them nothing is certain
+    into : how far the camera looks into the object; of what is open to it, a hollow shape is right
+        even where its form is not quite
     """
     if not len(score):
         return np.zeros(0)
     walls = float(_walls(hollow[:1], config)[0])
-    gained = float(score[0]) + config.hollow_bonus * walls - config.convincing
+    low, high = config.opening
+    bonus = np.interp(into, [low, high], [config.hollow_bonus, config.opening_bonus])
+    gained = float(score[0]) + float(bonus) * walls - config.convincing
     together = expit(config.sharpness * gained)
     together *= config.solid_most + (1 - config.solid_most) * walls
     together *= min(1.0, seen / config.many_seen)

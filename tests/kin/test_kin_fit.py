@@ -111,14 +111,20 @@ def test_what_nothing_is_like_keeps_its_completion(prior):
 
 def test_few_points_and_bad_fits_leave_the_weight_to_the_completion():
     score, solid, walls = np.array([0.9, 0.9]), np.zeros(2), np.full(2, 0.7)
-    assert kin_shares(score, walls, 400, KIN) == pytest.approx([0.5, 0.5], abs=1e-3)
-    assert kin_shares(score, walls, KIN.many_seen // 5, KIN).sum() == pytest.approx(0.2, abs=1e-3)
-    assert kin_shares(score, solid, 400, KIN).sum() == pytest.approx(KIN.solid_most, abs=1e-3)
-    assert kin_shares(score - 1.3, walls, 400, KIN).sum() < 1e-3
-    at = np.array([KIN.convincing - KIN.hollow_bonus, KIN.convincing - KIN.hollow_bonus - 0.1])
-    assert kin_shares(at, walls, 400, KIN).sum() == pytest.approx(0.5)
-    assert kin_shares(at, solid, 400, KIN).sum() < 0.01
-    assert kin_shares(at, walls, 400, KIN)[1] < 0.1
+
+    def shares(score, hollow, seen=400, into=0.0):
+        return kin_shares(score, hollow, seen, into, KIN)
+
+    assert shares(score, walls) == pytest.approx([0.5, 0.5], abs=1e-3)
+    assert shares(score, walls, seen=KIN.many_seen // 5).sum() == pytest.approx(0.2, abs=1e-3)
+    assert shares(score, solid).sum() == pytest.approx(KIN.solid_most, abs=1e-3)
+    assert shares(score - 1.3, walls).sum() < 1e-3
+    for into, bonus in ((0.0, KIN.hollow_bonus), (0.3, KIN.opening_bonus)):
+        at = KIN.convincing - bonus - np.array([0.0, 0.1])
+        assert shares(at, walls, into=into).sum() == pytest.approx(0.5)
+        assert shares(at, walls, into=into)[1] < 0.1
+        solids_share = KIN.solid_most / (1 + np.exp(KIN.sharpness * bonus))
+        assert shares(at, solid, into=into).sum() == pytest.approx(solids_share)
 
 
 @pytest.mark.parametrize("taper", [0.0, 0.2])
