@@ -6,10 +6,8 @@ about its footprint; u are coordinates in its box, -1 to 1 on each axis.
 
 from __future__ import annotations
 
-from collections import OrderedDict
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from threading import Lock
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,12 +32,8 @@ PARTS = (
     f"{DISTANCES}/spacing",
     f"{DISTANCES}/values",
 )
-# Libraries that are held in memory.
-HELD = 2
 # Normalised, of a sheet.
 LEAST_HALF = 1e-3
-
-_BUILDING = Lock()
 
 
 @dataclass(frozen=True)
@@ -117,9 +111,6 @@ class Library:
     reach: float
 
 
-_BUILT: OrderedDict[tuple[str, KinConfig], Library] = OrderedDict()
-
-
 @dataclass(frozen=True)
 class KinShape:
     """What a library needs of a stored object, normalised: its field, points (n, 3) of its surface,
@@ -133,18 +124,9 @@ class KinShape:
     probabilities: Array
 
 
-def kin_library(prior: Prior, config: KinConfig) -> Library:
-    """That of a prior, built when it is first asked for: about 10 ms an object. Errors:
-    PriorError."""
-    key = prior.digest, config
-    with _BUILDING:
-        if key not in _BUILT:
-            _BUILT[key] = library_of(list(_shapes(prior, config)), config)
-            if len(_BUILT) > HELD:
-                _BUILT.popitem(last=False)
-        else:
-            _BUILT.move_to_end(key)
-        return _BUILT[key]
+def library_of_prior(prior: Prior, config: KinConfig) -> Library:
+    """That of a prior: about 25 ms an object, most of it to read the shards. Errors: PriorError."""
+    return library_of(list(_shapes(prior, config)), config)
 
 
 def _shapes(prior: Prior, config: KinConfig) -> Iterator[KinShape]:

@@ -13,7 +13,8 @@ from brrp_cli.frames.frame import Frame
 from brrp_cli.inference.placed_shape import PlacedShape
 from brrp_cli.kin.evidence import Evidence, gather
 from brrp_cli.kin.fit import Fits, fit_kin
-from brrp_cli.kin.library import Library, kin_library
+from brrp_cli.kin.kept_library import kin_library
+from brrp_cli.kin.library import Library
 from brrp_cli.kin.opening import opening
 from brrp_cli.kin.placement import distance_and_slopes
 from brrp_cli.kin.stretched import pose, stretched

@@ -14,7 +14,7 @@ from brrp_cli.config import preset
 from brrp_cli.geometry import transform_points
 from brrp_cli.kin.evidence import gather
 from brrp_cli.kin.fit import fit_kin
-from brrp_cli.kin.library import kin_library
+from brrp_cli.kin.kept_library import kin_library
 from brrp_cli.kin.placement import Placements, distance_and_slopes
 from brrp_cli.kin.refine import refined
 from brrp_cli.kin.stretched import pose, stretched
