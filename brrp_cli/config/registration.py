@@ -212,5 +212,5 @@ class WeighConfig:
     """
 
     least_unknown: float = share(0.1)
-    most_unknown: float = share(0.9)
+    most_unknown: float = share(0.97)
     least_share: float = share(1e-3)
