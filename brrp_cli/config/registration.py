@@ -58,17 +58,23 @@ class VerificationConfig:
 class ColourConfig:
     """Which of the placements that depth cannot tell apart has the colours of the image.
 
-    The best placement is turned about each axis of its box in `turns` steps, both ways up; of those
-    whose alignment score is within `alike` of its own the one with the best colours is taken, if
-    their correlation is `better` by so much. Colours are compared at `vertices` vertices, of which
-    `least_seen` have to be within `near` metres of the measured depth; what differs by less than
-    `plain` (of 255) is of one colour.
+    The best placement is turned about each axis of its box in `turns` steps, both ways up; the best
+    are placed again, first those that are turned by `apart` radians from all better ones. Of those
+    whose alignment score is within `alike` of its own the one with the best sum of alignment score
+    and `worth` times the correlation of colours is taken: a box that one buys is not quite the one
+    that was scanned. It counts in full from a standard deviation of `textured` (of 255) on. Colours
+    are means over cells of `cell` metres, of at most `vertices` vertices, of which `least_seen`
+    have to be within `near` metres of the measured depth; what differs by less than `plain` (of
+    255) is of one colour.
     """
 
     turns: int = 24
-    alike: float = 0.03
-    better: float = 0.1
-    vertices: int = 1500
+    apart: float = 0.5
+    alike: float = 0.2
+    worth: float = 0.6
+    textured: float = 35.0
+    cell: float = 0.012
+    vertices: int = 4000
     least_seen: int = 40
     near: float = 0.01
     plain: float = 8.0

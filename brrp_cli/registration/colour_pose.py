@@ -13,44 +13,89 @@ from scipy.spatial.transform import Rotation
 from brrp_cli.config import ColourConfig
 from brrp_cli.frames.frame import Frame
 from brrp_cli.frames.projection import depth_behind, pixel_numbers
-from brrp_cli.geometry import similarity, transform_points
+from brrp_cli.geometry import transform_points
 from brrp_cli.registration.model import Model
 
 Array = NDArray[np.float64]
 
 
-def turned_about_itself(T_cam_model: Array, turns: int) -> Array:
-    """Placements (B, 4, 4) of a model turned about each axis of its box, both ways up: those under
-    which a box, a can or a bottle looks alike, among others. The first is the placement itself."""
+def turns_about_itself(turns: int) -> Rotation:
+    """Turns of a model about each axis of its box, both ways up, each once: those under which a
+    box, a can or a bottle looks alike, among others. The first is none."""
     angles = np.arange(turns) * (2 * np.pi / turns)
     found = [Rotation.identity()]
     for axis, other in (("z", "x"), ("y", "z"), ("x", "y")):
         for flip in (Rotation.identity(), Rotation.from_euler(other, np.pi)):
             found += [Rotation.from_euler(axis, angle) * flip for angle in angles]
-    return np.stack([T_cam_model @ similarity(rotation=each.as_matrix()) for each in found])
+    every = Rotation.concatenate(found)
+    matrices = np.round(every.as_matrix(), 6) + 0.0
+    first = np.unique(matrices.reshape(len(matrices), -1), axis=0, return_index=True)[1]
+    return every[np.sort(first)]
+
+
+def best_and_different(
+    turns: Rotation, score: Array, count: int, apart: float
+) -> NDArray[np.int64]:
+    """Rows of the `count` best turns, first those that are `apart` radians or more from all better
+    ones: the front of a box is not to be crowded out by its back, turned a little."""
+    order = np.argsort(-score, kind="stable")
+    different: list[int] = []
+    for row in order:
+        angle = (turns[different].inv() * turns[int(row)]).magnitude() if different else np.inf
+        if np.min(angle) >= apart:
+            different.append(int(row))
+    rest = [row for row in order if row not in set(different)]
+    return np.array([*different, *rest][:count], dtype=np.int64)
 
 
 def colour_agreement(T_cam_model: Array, model: Model, frame: Frame, config: ColourConfig) -> float:
+    """Correlation of the colours that are stored and seen: see `_compared`."""
+    return _compared(T_cam_model, model, frame, config)[0]
+
+
+def textured_agreement(
+    T_cam_model: Array, model: Model, frame: Frame, config: ColourConfig
+) -> float:
+    """The same, less where there is little to compare: on a plain thing light and shadow decide."""
+    correlation, contrast = _compared(T_cam_model, model, frame, config)
+    return correlation * min(1.0, contrast / config.textured) ** 2
+
+
+def _compared(
+    T_cam_model: Array, model: Model, frame: Frame, config: ColourConfig
+) -> tuple[float, float]:
     """Correlation, -1 to 1, of the stored colours of what faces the camera, placed by T_cam_model
     (4, 4), with the image's at the same pixels; each channel about its own mean, so that the
-    light's brightness and hue do not count. 0 where there is too little to see, or nothing but one
-    colour."""
+    light's brightness and hue do not count. Both are means over cells of the surface: letters lie
+    a little elsewhere. 0 where there is too little to see, or nothing but one colour. And the
+    standard deviation of the stored colours, of 255."""
     shape = model.stored.shape
     rows = np.linspace(0, len(shape.vertices) - 1, config.vertices).astype(np.int64)
-    points = transform_points(
-        T_cam_model, shape.vertices[rows].astype(np.float64) * model.stored.half_extent
-    )
+    metric = shape.vertices[rows].astype(np.float64) * model.stored.half_extent
+    points = transform_points(T_cam_model, metric)
     normals = shape.normals[rows] @ T_cam_model[:3, :3].T
     facing = np.einsum("ni,ni->n", normals, points) < 0
     pixel, inside = pixel_numbers(points, frame)
     near = np.abs(np.nan_to_num(depth_behind(points, frame), nan=np.inf)) < config.near
     seen = facing & inside & near
     if seen.sum() < config.least_seen:
-        return 0.0
-    stored = shape.colours[rows[seen]].astype(np.float64)
-    image = frame.rgb.reshape(-1, 3)[pixel[seen]].astype(np.float64)
-    stored, image = stored - stored.mean(axis=0), image - image.mean(axis=0)
-    spread = np.linalg.norm(stored), np.linalg.norm(image)
-    if min(spread) < config.plain * np.sqrt(stored.size):
-        return 0.0
-    return float((stored * image).sum() / (spread[0] * spread[1]))
+        return 0.0, 0.0
+    cells = np.floor(metric[seen] / config.cell).astype(np.int64)
+    _, cell, count = np.unique(cells, axis=0, return_inverse=True, return_counts=True)
+    stored = _by_cell(shape.colours[rows[seen]], cell.reshape(-1), count)
+    image = _by_cell(frame.rgb.reshape(-1, 3)[pixel[seen]], cell.reshape(-1), count)
+    spread = np.array([np.linalg.norm(stored), np.linalg.norm(image)])
+    deviation = spread / np.sqrt(3 * count.sum())
+    if deviation.min() < config.plain:
+        return 0.0, float(deviation[0])
+    return float((stored * image).sum() / spread.prod()), float(deviation[0])
+
+
+def _by_cell(
+    colours: NDArray[np.uint8], cell: NDArray[np.int64], count: NDArray[np.int64]
+) -> Array:
+    """Means (C, 3) of colours (n, 3) over C cells, about that of all, weighted so that the sum of
+    squares is one over colours."""
+    sums = np.stack([np.bincount(cell, weights=each) for each in colours.T], axis=-1)
+    centred = sums / count[:, None] - colours.mean(axis=0)
+    return np.asarray(centred * np.sqrt(count)[:, None])

@@ -11,10 +11,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
 from brrp_cli.config import FeatureConfig, SearchConfig
-from brrp_cli.geometry import transform_points
-from brrp_cli.registration.colour_pose import colour_agreement, turned_about_itself
+from brrp_cli.geometry import similarity, transform_points
+from brrp_cli.registration.colour_pose import (
+    best_and_different,
+    textured_agreement,
+    turns_about_itself,
+)
 from brrp_cli.registration.initial_poses import feature_matched_poses, resting_initial_poses
 from brrp_cli.registration.model import Model
 from brrp_cli.registration.scale_scan import ObservedCloud
@@ -79,35 +84,54 @@ def search(
             return _distinct(_judged(T[: config.fine], model, verifier, config), config)
         T = _refined(T, model, verifier, points, distance, steps)
     found = _judged(T, model, verifier, config)
-    found[0] = by_colour(found[0], verifier, config)
+    found = by_colour(found, verifier, config)
     if found[0].alignment_score < config.settled:
         found += _of_other_sizes(found, model, verifier, config)
     return _distinct(sorted(found, key=lambda each: -each.alignment_score), config)
 
 
-def by_colour(best: Hypothesis, verifier: Verifier, config: SearchConfig) -> Hypothesis:
-    """The best placement, or the one that looks like it in depth and more like the image in
-    colour."""
+def by_colour(
+    found: list[Hypothesis], verifier: Verifier, config: SearchConfig
+) -> list[Hypothesis]:
+    """The placements, best first. Where one that looks like the best in depth is more like the
+    image in colour, it takes its place, and those that are turned otherwise go."""
+    best = found[0]
     model, colour = best.model, config.colour
     if not model.stored.record.get("coloured"):
-        return best
-    T, _ = _best(
-        turned_about_itself(best.T_cam_model, colour.turns), model, verifier, config, config.middle
-    )
+        return found
+    turns = turns_about_itself(colour.turns)
+    T = np.stack([best.T_cam_model @ similarity(rotation=each) for each in turns.as_matrix()])
+    score = _coarse_score(T, model, verifier, config)
     T = _refined(
-        T, model, verifier, config.middle_points, config.fine_distance, config.middle_steps
+        T[best_and_different(turns, score, config.middle, colour.apart)],
+        model,
+        verifier,
+        config.middle_points,
+        config.fine_distance,
+        config.middle_steps,
     )
     alike = [
         each
         for each in [best, *_judged(T, model, verifier, config)]
         if each.alignment_score >= best.alignment_score - colour.alike
     ]
-    agreement = [colour_agreement(e.T_cam_model, model, verifier.frame, colour) for e in alike]
-    chosen = int(np.argmax(agreement))
-    if agreement[chosen] < agreement[0] + colour.better:
-        return best
-    # Depth cannot tell them apart: the score stays, and with it the order.
-    return replace(alike[chosen], alignment_score=best.alignment_score)
+    both = [
+        each.alignment_score
+        + colour.worth * textured_agreement(each.T_cam_model, model, verifier.frame, colour)
+        for each in alike
+    ]
+    chosen = int(np.argmax(both))
+    if chosen == 0:
+        return found
+    # Depth does not tell them apart: the score stays, and with it the order.
+    right = replace(alike[chosen], alignment_score=best.alignment_score)
+    turned = _rotation(right).inv()
+    near = [each for each in found if (turned * _rotation(each)).magnitude() < colour.apart]
+    return [right, *near]
+
+
+def _rotation(placed: Hypothesis) -> Rotation:
+    return Rotation.from_matrix(placed.T_cam_model[:3, :3] / placed.scale)
 
 
 def _distinct(found: list[Hypothesis], config: SearchConfig) -> list[Hypothesis]:
@@ -138,15 +162,22 @@ def _best(
 ) -> tuple[Array, float]:
     """The `count` best placements by a coarse alignment score, with one of `share` of its points,
     and the best score."""
-    score = verifier.score(
+    score = _coarse_score(T_cam_model, model, verifier, config, share)
+    order = np.argsort(-score, kind="stable")[:count]
+    return np.asarray(T_cam_model[order]), float(score[order[0]])
+
+
+def _coarse_score(
+    T_cam_model: Array, model: Model, verifier: Verifier, config: SearchConfig, share: int = 1
+) -> Array:
+    """Of placements (B, 4, 4), with one of `share` points of a coarse alignment score."""
+    return verifier.score(
         T_cam_model,
         model,
         config.alignment_score,
         model_points=config.model_points // share,
         seen_points=config.seen_points // share,
     )
-    order = np.argsort(-score, kind="stable")[:count]
-    return np.asarray(T_cam_model[order]), float(score[order[0]])
 
 
 def _judged(

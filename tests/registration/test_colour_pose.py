@@ -4,11 +4,17 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 from table_scene import MESHES, TABLE, in_camera, photograph, placed, stored
 
 from brrp_cli.config import ColourConfig, SearchConfig
 from brrp_cli.geometry import similarity, transform_points
-from brrp_cli.registration.colour_pose import colour_agreement, turned_about_itself
+from brrp_cli.registration.colour_pose import (
+    best_and_different,
+    colour_agreement,
+    textured_agreement,
+    turns_about_itself,
+)
 from brrp_cli.registration.model import search_model
 from brrp_cli.registration.pose_search import Hypothesis, by_colour
 from brrp_cli.registration.verification import Verifier
@@ -16,14 +22,19 @@ from brrp_cli.registration.verification import Verifier
 CONFIG = ColourConfig()
 
 
-def test_turns_hold_the_placement_itself_and_keep_its_middle() -> None:
-    T = similarity(rotation=np.eye(3), translation=np.array([0.1, 0.2, 0.9]))
-    found = turned_about_itself(T, 8)
-    np.testing.assert_array_equal(found[0], T)
-    np.testing.assert_allclose(found[:, :3, 3], np.tile(T[:3, 3], (len(found), 1)))
-    np.testing.assert_allclose(np.linalg.det(found[:, :3, :3]), 1)
-    # Upside down is among them.
-    assert any(np.allclose(each[:3, :3], np.diag([1, -1, -1])) for each in found)
+def test_turns_begin_with_none_hold_upside_down_and_come_once() -> None:
+    turns = turns_about_itself(8)
+    np.testing.assert_array_equal(turns[0].as_matrix(), np.eye(3))
+    assert any(np.allclose(each, np.diag([1, -1, -1])) for each in turns.as_matrix())
+    apart = [(turns[i].inv() * turns).magnitude() for i in range(len(turns))]
+    assert np.min(np.array(apart) + 10 * np.eye(len(turns))) > 0.1
+
+
+def test_a_front_is_not_crowded_out_by_a_back_that_is_turned_a_little() -> None:
+    turns = Rotation.from_rotvec(np.outer([0.0, 0.1, 0.2, np.pi, 3.0], [0, 0, 1]))
+    score = np.array([0.9, 0.8, 0.7, 0.5, 0.4])
+    assert best_and_different(turns, score, 3, 0.5).tolist() == [0, 3, 1]
+    assert best_and_different(turns, score, 9, 0.0).tolist() == [0, 1, 2, 3, 4]
 
 
 @pytest.fixture(scope="module")
@@ -63,7 +74,24 @@ def test_the_search_turns_a_box_round_by_its_colours(scene) -> None:
     record = {**model.stored.record, "coloured": True}
     model = replace(model, stored=replace(model.stored, record=record))
     best = Hypothesis(model, back_to_front, 1.0, 0.95)
-    found = by_colour(best, Verifier(points, frame, TABLE), SearchConfig())
+    aside = replace(best, T_cam_model=similarity(translation=np.array([0.01, 0, 0])) @ T)
+    config = SearchConfig()
+    verifier = Verifier(points, frame, TABLE)
     # Upside down the box is the same, in colour too.
-    np.testing.assert_allclose(found.T_cam_model[:3, [0, 3]], T[:3, [0, 3]], atol=2e-3)
-    assert found.alignment_score == best.alignment_score
+    turned, *others = by_colour([best, best, aside], verifier, config)
+    np.testing.assert_allclose(turned.T_cam_model[:3, [0, 3]], T[:3, [0, 3]], atol=2e-3)
+    assert turned.alignment_score == best.alignment_score
+    assert all(each is aside for each in others), "no other that is back to front"
+    right = replace(best, T_cam_model=T)
+    kept = by_colour([right, replace(aside, alignment_score=0.5)], verifier, config)[0]
+    np.testing.assert_allclose(kept.T_cam_model[:3, [0, 3]], T[:3, [0, 3]], atol=2e-3)
+
+
+def test_faint_colours_say_little_and_strong_ones_all(scene) -> None:
+    model, T, frame = scene
+    assert textured_agreement(T, model, frame, CONFIG) == colour_agreement(T, model, frame, CONFIG)
+    faint = (model.stored.shape.colours * 0.15).astype(np.uint8)
+    shape = replace(model.stored.shape, colours=faint)
+    model = replace(model, stored=replace(model.stored, shape=shape))
+    assert colour_agreement(T, model, frame, CONFIG) > 0.8
+    assert 0 < textured_agreement(T, model, frame, CONFIG) < 0.3
