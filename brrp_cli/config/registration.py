@@ -61,18 +61,19 @@ class ColourConfig:
     The best placement is turned about each axis of its box in `turns` steps, both ways up; the best
     are placed again, first those that are turned by `apart` radians from all better ones. Of those
     whose alignment score is within `alike` of its own the one with the best sum of alignment score
-    and `worth` times the correlation of colours is taken: a box that one buys is not quite the one
-    that was scanned. It counts in full from a standard deviation of `textured` (of 255) on. Colours
-    are means over cells of `cell` metres, of at most `vertices` vertices, of which `least_seen`
-    have to be within `near` metres of the measured depth; what differs by less than `plain` (of
-    255) is of one colour.
+    and `worth` times the correlation of colours is taken, if that gains `gain`: a box that one buys
+    is not quite the one that was scanned. It counts in full from a standard deviation of `textured`
+    (of 255) on. Colours are means over cells of `cell` metres, of at most `vertices` vertices, of
+    which `least_seen` have to be within `near` metres of the measured depth; what differs by less
+    than `plain` (of 255) is of one colour.
     """
 
     turns: int = 24
     apart: float = 0.5
     alike: float = 0.2
     worth: float = 0.6
-    textured: float = 35.0
+    gain: float = 0.05
+    textured: float = 30.0
     cell: float = 0.012
     vertices: int = 4000
     least_seen: int = 40

@@ -121,7 +121,7 @@ def by_colour(
         for each in alike
     ]
     chosen = int(np.argmax(both))
-    if chosen == 0:
+    if both[chosen] < both[0] + colour.gain:
         return found
     # Depth does not tell them apart: the score stays, and with it the order.
     right = replace(alike[chosen], alignment_score=best.alignment_score)
