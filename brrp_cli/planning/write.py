@@ -1,4 +1,4 @@
-"""The folder of a plan: meshes, URDF, MJCF, a cuRobo world, one GLB and a record."""
+"""The folder of a plan: meshes, URDF, MJCF, a cuRobo world, MoveIt's scene, one GLB, a record."""
 
 from __future__ import annotations
 
@@ -15,6 +15,8 @@ from brrp_cli.files import atomic_folder
 from brrp_cli.planning.body import Body
 from brrp_cli.planning.curobo import curobo_world
 from brrp_cli.planning.mjcf import Files, Table, body_mjcf, scene_mjcf
+from brrp_cli.planning.moveit import planning_scene, scene_text
+from brrp_cli.planning.moveit_grasps import grasp_frames, grasp_messages, stored_grasps
 from brrp_cli.planning.options import PlanOptions
 from brrp_cli.planning.scene import PlannedObject, planned_objects, table_under, upwards
 from brrp_cli.planning.urdf import urdf
@@ -29,6 +31,7 @@ if TYPE_CHECKING:
 SCHEMA = 1
 RECORD = "plan.json"
 WORLD, SCENE, GLB = "world.yml", "scene.xml", "scene.glb"
+MOVEIT, MOVEIT_SCENE, MOVEIT_GRASPS = "moveit.scene", "moveit.json", "moveit_grasps.json"
 TABLE_COLOUR = (180, 168, 150, 255)
 
 
@@ -62,6 +65,8 @@ def write_plan(
             (partial / f"{name}.xml").write_text(body_mjcf(body, files[name]))
         (partial / SCENE).write_text(scene_mjcf(bodies, files, table))
         (partial / WORLD).write_text(curobo_world(bodies, table, stored.record["frame"]))
+        if options.moveit is not None:
+            _write_moveit(stored, partial, bodies, table, options.moveit)
         _glb(bodies, table).export(partial / GLB)
         record = _record(stored, options, objects, files, table)
         (partial / RECORD).write_text(json.dumps(record, indent=2) + "\n")
@@ -83,6 +88,26 @@ def _write_meshes(body: Body, folder: Path, options: PlanOptions) -> Files:
     if options.confidence is not None:
         _save(body.collision, folder / "meshes" / f"{body.name}_inside.obj")
     return names
+
+
+def _write_moveit(
+    stored: StoredResult,
+    folder: Path,
+    bodies: dict[str, Body],
+    table: Table | None,
+    frame_id: str,
+) -> None:
+    """Its text file and its message, and the grasps of the results where there are any. Errors:
+    ResultError for a grasps.json that cannot be read."""
+    frame_id = frame_id or str(stored.record["frame"])
+    found = stored_grasps(stored.folder)
+    frames = grasp_frames(found)
+    (folder / MOVEIT).write_text(scene_text(bodies, table, frames))
+    message = planning_scene(bodies, table, frames, frame_id)
+    (folder / MOVEIT_SCENE).write_text(json.dumps(message) + "\n")
+    if found:
+        messages = grasp_messages(found, upwards(stored), frame_id)
+        (folder / MOVEIT_GRASPS).write_text(json.dumps(messages, indent=1) + "\n")
 
 
 def _save(mesh: trimesh.Trimesh, path: Path) -> None:
