@@ -20,6 +20,8 @@ if TYPE_CHECKING:
     from brrp_cli.results.read import StoredResult
 
 FOLDER = "plan"
+# An object that moves by more in three seconds does not rest: mm, degrees.
+SHIFTS, TURNS = 5.0, 5.0
 CONFIDENCE = click.FloatRange(0.5, 0.999)
 
 
@@ -65,6 +67,13 @@ CONFIDENCE = click.FloatRange(0.5, 0.999)
     metavar="NAME",
     help="What MoveIt calls the frame of the results. [default: camera or world]",
 )
+@click.option(
+    "--rest/--no-rest",
+    default=True,
+    show_default=True,
+    help="Move objects, as little as it takes, to where they rest in a simulation. Not with "
+    "--confidence.",
+)
 @click.option("--seed", type=SEED, default=0, show_default=True, help=SEED_HELP)
 @json_option
 @click.option("--overwrite", is_flag=True, help="Replace the output folder if it is there.")
@@ -77,6 +86,7 @@ def command(
     density: float,
     moveit: bool,
     frame_id: str | None,
+    rest: bool,
     seed: int,
     as_json: bool,
     overwrite: bool,
@@ -101,13 +111,22 @@ def command(
 
     from brrp_cli.api import open_result
 
-    check_available(collision)
     scene = (frame_id or "") if moveit else None
-    options = PlanOptions(collision, confidence, margin / 1000, density, seed, scene)
+    options = PlanOptions(collision, confidence, margin / 1000, density, seed, scene, rest)
+    check_libraries(options)
     with report_of(as_json) as report:
         record = export(open_result(results), output, options, overwrite=overwrite)
         report["output"] = str(output or results / FOLDER)
         report.update(record)
+
+
+def check_libraries(options: PlanOptions) -> None:
+    """DependencyError where one is missing that these options need."""
+    from brrp_cli.planning.rest import check_simulator
+
+    check_available(options.collision)
+    if options.rests:
+        check_simulator()
 
 
 def export(
@@ -140,8 +159,18 @@ def export(
 
 def told(item: dict[str, Any]) -> str:
     """One object's numbers for people."""
-    count = len(item["parts"])
+    count, rest = len(item["parts"]), item["rest"]
     text = f"{count} part{'s' if count > 1 else ''}, {item['mass'] * 1000:.0f} g"
+    if rest is not None:
+        text += f", put to rest {rest['moved_mm']:.1f} mm and {rest['turned_degrees']:.1f}° away"
+        if rest["foot_mm"]:
+            text += f", on a foot of {rest['foot_mm']:.0f} mm" + " and a plate" * rest["plate"]
+        left = rest["left_alone"]
+        if left["moved_mm"] > SHIFTS or left["turned_degrees"] > TURNS:
+            text += (
+                f"; left alone it moves by {left['moved_mm']:.0f} mm"
+                f" and {left['turned_degrees']:.0f}°"
+            )
     if "level" in item:
         text += (
             f", {item['margin_mean'] * 1000:.1f} mm beyond the mesh on average"
