@@ -1,4 +1,4 @@
-"""How still the scenes lie that `brrp export` writes: MuJoCo, three seconds, nobody touches them.
+"""How still the scenes lie that `brrp export` writes: three seconds in which nobody touches them.
 
     brrp export out/ --no-rest -o before/
     brrp export out/ -o after/
@@ -6,18 +6,25 @@
 
 Each argument is NAME=FOLDER, where FOLDER is one plan or holds several. For each name: the share of
 objects that move by less than 5 mm and 5 degrees in three seconds, the deepest overlap of two
-objects at the start, and the corrections that plan.json tells.
+objects at the start, and the corrections that plan.json tells. The simulator is MuJoCo, with
+scene.xml, or PyBullet, with the URDFs at their places on a box.
 """
 
 from __future__ import annotations
 
 import json
+import sys
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import click
 import numpy as np
+
+# The script also runs from a checkout that is not installed.
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+from brrp_cli.planning.numbers import quaternion_wxyz
 
 SECONDS = 3.0
 LIMIT_MM, LIMIT_DEGREES = 5.0, 5.0
@@ -44,8 +51,11 @@ class Stillness:
 
 @click.command()
 @click.argument("sets", nargs=-1, required=True, metavar="NAME=FOLDER...")
+@click.option(
+    "--simulator", type=click.Choice(["mujoco", "pybullet"]), default="mujoco", show_default=True
+)
 @click.option("--each", is_flag=True, help="Also a line for each object that does not rest.")
-def main(sets: tuple[str, ...], each: bool) -> None:
+def main(sets: tuple[str, ...], simulator: str, each: bool) -> None:
     """Simulate what lies in folders of `brrp export` and tell how much of it rests."""
     found: dict[str, list[Stillness]] = {}
     for text in sets:
@@ -53,7 +63,8 @@ def main(sets: tuple[str, ...], each: bool) -> None:
         plans = sorted(path.parent for path in Path(folder).rglob("plan.json"))
         if not plans:
             raise click.ClickException(f"no plan.json below {folder}")
-        found.setdefault(name, []).extend(item for plan in plans for item in stillness(plan))
+        run = stillness if simulator == "mujoco" else stillness_in_pybullet
+        found.setdefault(name, []).extend(item for plan in plans for item in run(plan))
     click.echo(report(found))
     if each:
         for name, items in found.items():
@@ -85,7 +96,7 @@ def report(found: dict[str, list[Stillness]]) -> str:
 
 
 def stillness(plan: Path) -> list[Stillness]:
-    """One for each object of a plan."""
+    """One for each object of a plan, in MuJoCo."""
     import mujoco
 
     record = json.loads((plan / "plan.json").read_text())
@@ -102,23 +113,69 @@ def stillness(plan: Path) -> list[Stillness]:
     first = {name: _place(data, name) for name in names}
     while data.time < SECONDS:
         mujoco.mj_step(model, data)
+    last = {name: _place(data, name) for name in names}
+    return _told(plan, record, first, last, overlap)
+
+
+def stillness_in_pybullet(plan: Path) -> list[Stillness]:
+    """The same with each URDF where it rests, or was measured, on a box under a scene of its
+    own."""
+    import pybullet as bullet
+
+    record = json.loads((plan / "plan.json").read_text())
+    client = bullet.connect(bullet.DIRECT)
+    try:
+        table = record["table"]
+        half = [edge / 2 for edge in table["size"]]
+        shape = bullet.createCollisionShape(
+            bullet.GEOM_BOX, halfExtents=half, physicsClientId=client
+        )
+        ground = bullet.createMultiBody(0, shape, -1, *_bullet(table["T_frame_table"]))
+        bullet.changeDynamics(ground, -1, lateralFriction=1.0)
+        bullet.setGravity(*(-9.81 * np.array(record["up"])), physicsClientId=client)
+        ids = {}
+        for item in record["objects"]:
+            T = (item.get("rest") or item)["T_frame_body"]
+            ids[item["name"]] = bullet.loadURDF(str(plan / item["urdf"]), *_bullet(T))
+        overlap = dict.fromkeys(ids, 0.0)
+        for name, one in ids.items():
+            for other in ids.values():
+                near = bullet.getClosestPoints(one, other, 0.0) if other != one else ()
+                overlap[name] = max([overlap[name], *(-1000 * point[8] for point in near)])
+        first = {name: _bullet_place(bullet, one) for name, one in ids.items()}
+        for _ in range(round(240 * SECONDS)):
+            bullet.stepSimulation(client)
+        last = {name: _bullet_place(bullet, one) for name, one in ids.items()}
+    finally:
+        bullet.disconnect(client)
+    return _told(plan, record, first, last, overlap)
+
+
+def _told(
+    plan: Path,
+    record: dict[str, Any],
+    first: dict[str, Any],
+    last: dict[str, Any],
+    overlap: dict[str, float],
+) -> list[Stillness]:
     found = []
     for item in record["objects"]:
-        name = item["name"]
-        moved, turned = _between(first[name], _place(data, name))
-        rest = item.get("rest") or {}
-        found.append(
-            Stillness(
-                str(plan),
-                name,
-                moved,
-                turned,
-                overlap[name],
-                rest.get("moved_mm", np.nan),
-                rest.get("turned_degrees", np.nan),
-            )
-        )
+        name, rest = item["name"], item.get("rest") or {}
+        moved = _between(first[name], last[name])
+        corrected = (rest.get("moved_mm", np.nan), rest.get("turned_degrees", np.nan))
+        found.append(Stillness(str(plan), name, *moved, overlap[name], *corrected))
     return found
+
+
+def _bullet(T: list[list[float]]) -> tuple[list[float], list[float]]:
+    """Position and quaternion x y z w of T (4, 4)."""
+    w, x, y, z = quaternion_wxyz(np.array(T)[:3, :3])
+    return [row[3] for row in T[:3]], [x, y, z, w]
+
+
+def _bullet_place(bullet: Any, body: int) -> tuple[np.ndarray, np.ndarray]:
+    place, turn = bullet.getBasePositionAndOrientation(body)
+    return np.array(place), np.array(bullet.getMatrixFromQuaternion(turn)).reshape(3, 3)
 
 
 def _place(data: Any, name: str) -> tuple[np.ndarray, np.ndarray]:

@@ -10,7 +10,7 @@ import pytest
 import trimesh
 from click.testing import CliRunner
 from made_result import BOX, ELL, write_made_result
-from measure_rest import report, stillness
+from measure_rest import report, stillness, stillness_in_pybullet
 from scipy.spatial.transform import Rotation
 
 from brrp_cli.cli import main
@@ -141,6 +141,15 @@ def test_an_exported_scene_rests_and_tells_what_it_changed(results):
     for item in found:
         assert item.rests and item.moved < 1 and item.turned < 1 and item.overlap < 0.5
     assert "| made | 2 | 100%" in report({"made": found})
+
+
+def test_it_rests_in_another_simulator_too(results):
+    pytest.importorskip("pybullet")
+    export(results)
+    found = stillness_in_pybullet(results / "plan")
+    assert len(found) == 2
+    # Bullet keeps hulls a margin of a millimetre apart.
+    assert all(item.rests and item.overlap < 1 for item in found)
 
 
 def test_without_it_and_with_a_confidence_they_stay_where_they_were_measured(results):
