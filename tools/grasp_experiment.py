@@ -111,11 +111,11 @@ def main(
                 )
                 with output.open("a") as stream:
                     stream.writelines(json.dumps(row) + "\n" for row in rows)
+                if film is not None and film_of is not None:
+                    film.save(film_of)
                 held = sum(row["result"] == "held" for row in rows)
                 seconds = time.perf_counter() - start
                 click.echo(f"{label}: {len(rows)} rows, {held} held, {seconds:.0f} s", err=True)
-        if film is not None and film_of is not None:
-            film.save(film_of)
     except BrrpError as error:
         raise click.ClickException(str(error)) from error
     click.echo(report(_rows(output), DRIFT))

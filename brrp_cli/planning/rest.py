@@ -170,7 +170,9 @@ class _World:
         """No weight, no friction, no turning."""
         self.model.opt.gravity[:] = 0
         self.model.geom_friction[:] = 1e-4
+        self.model.geom_solref[:, 0] = self.config.apart_time
         self._run(self.config.apart, self.config.slow, turning=False)
+        self.model.geom_solref[:, 0] = self.config.contact_time
         self.model.opt.gravity[:] = self.gravity
         self.model.geom_friction[:] = self.friction
 
