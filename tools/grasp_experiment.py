@@ -7,7 +7,8 @@
 For each object: the best grasp of each method, and of `default` another one, drawn at random among
 those that it plans, so that low scores are tried as well. A floating hand of boxes with limited
 force comes in from the pre-grasp, closes, lifts by 20 cm and shakes, open loop. A grasp holds if
-the object is still in the hand at the end. Rows that are there are not made again.
+the object is still in the hand at the end. Rows that are there are not made again. --film draws
+the first grasps of this run that held, and the first that failed in each way.
 """
 
 from __future__ import annotations
@@ -25,6 +26,7 @@ import click
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from grasp_trial.bodies import true_body
+from grasp_trial.film import Film, Take
 from grasp_trial.methods import DEFAULT, METHODS, scenes_of
 from grasp_trial.report import report
 from grasp_trial.trial import Trials
@@ -57,6 +59,7 @@ DRIFT = 0.005  # metres
 @click.option("--seed", default=0, show_default=True)
 @click.option("--cache", type=click.Path(path_type=Path), help="Of true meshes and their parts.")
 @click.option("--report", "report_of", type=click.Path(path_type=Path), help="Only tell a file.")
+@click.option("--film", "film_of", type=click.Path(path_type=Path), help="PNG of some grasps.")
 @click.option("-o", "--output", type=click.Path(path_type=Path))
 def main(
     sets: tuple[str, ...],
@@ -69,6 +72,7 @@ def main(
     seed: int,
     cache: Path | None,
     report_of: Path | None,
+    film_of: Path | None,
     output: Path | None,
 ) -> None:
     """Plan grasps in each scene of SETS by each method, carry them out, write a row for each."""
@@ -78,6 +82,7 @@ def main(
     chosen = tuple(name.strip() for name in methods.split(","))
     if output is None or not sets or set(chosen) - set(METHODS):
         raise click.UsageError(f"name sets, -o FILE, and --methods of {', '.join(METHODS)}")
+    film = None if film_of is None else Film()
     try:
         prior, retriever = _open(prior_path, seed)
         hand = open_gripper(gripper)
@@ -101,10 +106,13 @@ def main(
                         cache or truth_cache(),
                         prior,
                         retriever,
+                        film,
                     )
                 )
                 with output.open("a") as stream:
                     stream.writelines(json.dumps(row) + "\n" for row in rows)
+                if film is not None and film_of is not None:
+                    film.save(film_of)
                 held = sum(row["result"] == "held" for row in rows)
                 seconds = time.perf_counter() - start
                 click.echo(f"{label}: {len(rows)} rows, {held} held, {seconds:.0f} s", err=True)
@@ -139,6 +147,7 @@ def _scene_rows(
     cache: Path,
     prior: Any,
     retriever: Any,
+    film: Film | None,
 ) -> Iterator[dict[str, Any]]:
     """A row for each grasp that is carried out, and for each object without one."""
     frame = scene.view(0)
@@ -169,20 +178,27 @@ def _scene_rows(
                 why = of[object_id].why if object_id in of else "it has no mesh"
                 yield row | {"result": "none", "why": why, "score": None, "drift": None}
                 continue
-            yield row | _carried_out(trials, grasps[0], frame.T_world_cam, config)
+            yield row | _carried_out(trials, grasps[0], frame.T_world_cam, config, method, film)
             if method == DEFAULT and len(grasps) > 1:
                 rng = child_rng(seed, "trial", scene.name, object_id)
                 other = grasps[int(rng.integers(1, len(grasps)))]
-                yield (
-                    row | {"rank": "drawn"} | _carried_out(trials, other, frame.T_world_cam, config)
-                )
+                tried = _carried_out(trials, other, frame.T_world_cam, config, method, film)
+                yield row | {"rank": "drawn"} | tried
 
 
 def _carried_out(
-    trials: Trials, grasp: Grasp, T_world_cam: Any, config: GraspConfig
+    trials: Trials,
+    grasp: Grasp,
+    T_world_cam: Any,
+    config: GraspConfig,
+    method: str,
+    film: Film | None,
 ) -> dict[str, Any]:
     T = T_world_cam @ grasp.T_cam_gripper
-    outcome = trials.attempt(grasp.object_id, T, grasp.opening, config.approach)
+    take = Take(trials.model, f"object_{grasp.object_id}", (T @ [0, 0, trials.gripper.tip, 1])[:3])
+    outcome = trials.attempt(grasp.object_id, T, grasp.opening, config.approach, take)
+    if film is not None and outcome.drift <= DRIFT and film.wants(outcome.result):
+        film.add(f"{method}, score {grasp.score:.2f}", outcome.result, take)
     return {
         "result": outcome.result,
         "score": grasp.score,

@@ -20,6 +20,8 @@ if TYPE_CHECKING:
     from brrp_cli.results.read import StoredResult
 
 FOLDER = "plan"
+# An object that moves by more in three seconds does not rest: mm, degrees.
+SHIFTS, TURNS = 5.0, 5.0
 CONFIDENCE = click.FloatRange(0.5, 0.999)
 
 
@@ -55,6 +57,23 @@ CONFIDENCE = click.FloatRange(0.5, 0.999)
     show_default=True,
     help="kg / m^3 of solid objects, for mass and inertia.",
 )
+@click.option(
+    "--moveit",
+    is_flag=True,
+    help="Also write a planning scene for MoveIt, with the grasps of `brrp grasp`.",
+)
+@click.option(
+    "--frame-id",
+    metavar="NAME",
+    help="What MoveIt calls the frame of the results. [default: camera or world]",
+)
+@click.option(
+    "--rest/--no-rest",
+    default=True,
+    show_default=True,
+    help="Move objects, as little as it takes, to where they rest in a simulation. Not with "
+    "--confidence.",
+)
 @click.option("--seed", type=SEED, default=0, show_default=True, help=SEED_HELP)
 @json_option
 @click.option("--overwrite", is_flag=True, help="Replace the output folder if it is there.")
@@ -65,11 +84,14 @@ def command(
     confidence: float | None,
     margin: float,
     density: float,
+    moveit: bool,
+    frame_id: str | None,
+    rest: bool,
     seed: int,
     as_json: bool,
     overwrite: bool,
 ) -> None:
-    """Turn results into collision shapes: URDF, MJCF, a cuRobo world.
+    """Turn results into collision shapes: URDF, MJCF, a cuRobo world, a scene for MoveIt.
 
     OUT/ is a folder that `brrp reconstruct` wrote. For each object: convex parts, a URDF and an
     MJCF; for all of them scene.xml (MuJoCo), world.yml (cuRobo) and scene.glb, in the frame of
@@ -79,19 +101,32 @@ def command(
     Example:
       brrp export out/ --collision hull
       brrp export out/ --confidence 0.95 -o plan/
+      brrp export out/ --confidence 0.95 --moveit --frame-id base_link
     """
     if margin and confidence is None:
         raise click.UsageError("--margin grows the shapes of --confidence, so give both")
+    if frame_id is not None and not moveit:
+        raise click.UsageError("--frame-id is of the planning scene of --moveit, so give both")
     require_results(results)
 
     from brrp_cli.api import open_result
 
-    check_available(collision)
-    options = PlanOptions(collision, confidence, margin / 1000, density, seed)
+    scene = (frame_id or "") if moveit else None
+    options = PlanOptions(collision, confidence, margin / 1000, density, seed, scene, rest)
+    check_libraries(options)
     with report_of(as_json) as report:
         record = export(open_result(results), output, options, overwrite=overwrite)
         report["output"] = str(output or results / FOLDER)
         report.update(record)
+
+
+def check_libraries(options: PlanOptions) -> None:
+    """DependencyError where one is missing that these options need."""
+    from brrp_cli.planning.rest import check_simulator
+
+    check_available(options.collision)
+    if options.rests:
+        check_simulator()
 
 
 def export(
@@ -113,18 +148,29 @@ def export(
         if options.confidence is None
         else f"that hold the objects with probability {options.confidence:g}"
     )
+    moveit = "" if options.moveit is None else "moveit.scene, moveit.json, "
     click.echo(
         f"Wrote collision shapes {shapes} ({options.collision}) of {len(record['objects'])} "
         f"objects, metres, {record['frame']} frame: {folder}/ "
-        "(object_*.urdf, object_*.xml, scene.xml, world.yml, scene.glb, plan.json)"
+        f"(object_*.urdf, object_*.xml, scene.xml, world.yml, {moveit}scene.glb, plan.json)"
     )
     return record
 
 
 def told(item: dict[str, Any]) -> str:
     """One object's numbers for people."""
-    count = len(item["parts"])
+    count, rest = len(item["parts"]), item["rest"]
     text = f"{count} part{'s' if count > 1 else ''}, {item['mass'] * 1000:.0f} g"
+    if rest is not None:
+        text += f", put to rest {rest['moved_mm']:.1f} mm and {rest['turned_degrees']:.1f}° away"
+        if rest["foot_mm"]:
+            text += f", on a foot of {rest['foot_mm']:.0f} mm" + " and a plate" * rest["plate"]
+        left = rest["left_alone"]
+        if left["moved_mm"] > SHIFTS or left["turned_degrees"] > TURNS:
+            text += (
+                f"; left alone it moves by {left['moved_mm']:.0f} mm"
+                f" and {left['turned_degrees']:.0f}°"
+            )
     if "level" in item:
         text += (
             f", {item['margin_mean'] * 1000:.1f} mm beyond the mesh on average"

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from brrp_cli.commands.export import CONFIDENCE, export
+from brrp_cli.commands.export import CONFIDENCE, check_libraries, export
 from brrp_cli.commands.grasp import GRIPPER_HELP, JSON, grasp
 from brrp_cli.commands.json_option import json_option, report_of
 from brrp_cli.commands.made_masks import make_masks, tell_mended
@@ -34,7 +34,7 @@ from brrp_cli.grasping.gripper_file import open_gripper
 from brrp_cli.grasping.record import RECORD
 from brrp_cli.methods.registry import DEFAULT, METHODS, preset_names, reconstructing
 from brrp_cli.planning.options import PlanOptions
-from brrp_cli.planning.parts import HOW, check_available
+from brrp_cli.planning.parts import HOW
 from brrp_cli.progress import note
 from brrp_cli.retrieval.choose import RETRIEVERS, choose_retriever
 from brrp_cli.retrieval.clip.model_files import CLIP_DIR_VARIABLE
@@ -300,7 +300,8 @@ def check_collision(collision: str, confidence: float | None) -> None:
     """UsageError for --confidence alone; DependencyError where a library is missing."""
     if collision == NO_COLLISION and confidence is not None:
         raise click.UsageError(f"--confidence is of collision shapes: add --collision {HOW[0]}")
-    check_available(collision)
+    if collision != NO_COLLISION:
+        check_libraries(PlanOptions(collision, confidence))
 
 
 def check_gripper(grasp_it: bool, gripper: str | None) -> Gripper | None:

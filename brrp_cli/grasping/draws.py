@@ -26,8 +26,6 @@ from brrp_cli.inference.placed_shape import PlacedShape
 from brrp_cli.surface.extract import grid_axes, level_set
 
 Array = NDArray[np.float64]
-# Metres around a mesh in which its drawn surfaces are looked for.
-AROUND = 0.03
 # A hit further off than any ray of a hand goes.
 NOTHING = np.inf
 
@@ -194,7 +192,7 @@ def _level_sets(
     """A level set of each of `particles` (k,); None where nothing of it is near what was seen."""
     if not len(particles) or item.posterior is None:
         return []
-    margin = np.array([[-AROUND], [AROUND]])
+    margin = np.array([[-config.around], [config.around]])
     near = np.stack([item.vertices.min(axis=0), item.vertices.max(axis=0)]) + margin
     bounds = item.posterior.bounds
     box = np.stack([np.maximum(near[0], bounds[0]), np.minimum(near[1], bounds[1])])

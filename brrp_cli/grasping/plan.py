@@ -6,7 +6,7 @@ best = plan_grasps(open_result("out/"), "franka-hand").grasps[0]
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -31,9 +31,6 @@ from brrp_cli.surface.confidence import confidence_surface
 from brrp_cli.threads import cores, in_threads
 
 Array = NDArray[np.float64]
-
-# Loose points that are looked at, at most.
-LOOSE = 2000
 
 
 def plan_grasps(
@@ -83,8 +80,9 @@ def collision_shape(item: GraspObject, scene: GraspScene, config: GraspConfig) -
     own = Mesh(item.vertices, item.faces)
     if item.posterior is None or config.confidence == 0:
         return own
+    surface = replace(scene.surface, around_nodes=config.neighbour_nodes)
     found = confidence_surface(
-        item.posterior, item.observed, min(config.confidence, 0.999), scene.surface
+        item.posterior, item.observed, min(config.confidence, 0.999), surface
     )
     return own if found is None else Mesh(found.vertices, found.faces)
 
@@ -120,7 +118,7 @@ def _plan_object(task: _Task) -> ObjectGrasps:
     poses, clear = lifted_off(poses, scene.plane, gripper, config)
     poses = _kept(poses, clear, fell, "table")
     others = [shape for i, shape in enumerate(task.shapes) if i != task.number]
-    obstacles = Obstacles(others, _some(scene.loose))
+    obstacles = Obstacles(others, _some(scene.loose, config.loose))
     hit = obstacles.probably_hits(poses.T, poses.openings, gripper, config)
     poses = _kept(poses, ~hit, fell, "neighbour")
     poses = _most_promising(item, own, poses, gripper, config, fell)
@@ -303,5 +301,5 @@ def _why(fell: dict[str, int]) -> str:
     return "nothing was found"
 
 
-def _some(points: Array) -> Array:
-    return points[:: max(1, len(points) // LOOSE)]
+def _some(points: Array, most: int) -> Array:
+    return points[:: max(1, -(-len(points) // most))]

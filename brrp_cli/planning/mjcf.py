@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from brrp_cli.config.planning import RestConfig
 from brrp_cli.planning.body import Body, lift_onto
 from brrp_cli.planning.numbers import quaternion_wxyz, spell
 
@@ -45,38 +46,59 @@ class Files:
     parts: Sequence[str]
 
 
-def body_mjcf(body: Body, files: Files) -> str:
+def body_mjcf(body: Body, files: Files, config: RestConfig) -> str:
     """A model of one free body at the origin."""
-    model, assets, world = _model(body.name, np.array([0.0, 0.0, -GRAVITY]))
+    model, assets, world = _model(body.name, np.array([0.0, 0.0, -GRAVITY]), config)
     _add_body(assets, world, body, files, np.eye(4))
     return _text(model)
 
 
-def scene_mjcf(bodies: Mapping[str, Body], files: Mapping[str, Files], table: Table | None) -> str:
-    """A model of all bodies, free, at their places on the table, in the frame of the results.
+def scene_mjcf(
+    bodies: Mapping[str, Body],
+    files: Mapping[str, Files],
+    table: Table | None,
+    config: RestConfig,
+    poses: Mapping[str, NDArray[np.float64]] | None = None,
+) -> str:
+    """A model of all bodies, free, on the table, in the frame of the results. Gravity is along the
+    table's normal; without a table there is none.
 
-    A body whose collision shape reaches below the table's top is put on top of it. Gravity is along
-    the table's normal; without a table there is none.
+    poses : T_frame_body by name; None: their own, and a body whose collision shape reaches below
+    the table's top is put on top of it
     """
     gravity = np.zeros(3) if table is None else -GRAVITY * table.up
-    model, assets, world = _model("scene", gravity)
+    model, assets, world = _model("scene", gravity, config)
     if table is not None:
         place = ET.SubElement(world, "body", {"name": "table", **_pose(table.T_frame_table)})
         half = spell(table.size / 2)
         ET.SubElement(place, "geom", name="table", type="box", size=half, rgba="0.7 0.66 0.6 1")
     for name, body in bodies.items():
-        T = body.T_frame_body.copy()
-        if table is not None:
+        T = body.T_frame_body.copy() if poses is None else poses[name]
+        if table is not None and poses is None:
             lift = lift_onto(body, table.up, table.offset)
             T[:3, 3] += (lift + CLEARANCE if lift > 0 else 0.0) * table.up
         _add_body(assets, world, body, files[name], T)
     return _text(model)
 
 
-def _model(name: str, gravity: NDArray[np.float64]) -> tuple[ET.Element, ET.Element, ET.Element]:
+def _model(
+    name: str, gravity: NDArray[np.float64], config: RestConfig
+) -> tuple[ET.Element, ET.Element, ET.Element]:
     model = ET.Element("mujoco", model=name)
     ET.SubElement(model, "compiler", angle="radian")
-    ET.SubElement(model, "option", gravity=spell(gravity), integrator="implicitfast")
+    # MuJoCo's manual: such cones and this ratio keep what friction holds from creeping.
+    ET.SubElement(
+        model,
+        "option",
+        gravity=spell(gravity),
+        integrator="implicitfast",
+        cone="elliptic",
+        impratio="10",
+    )
+    default = ET.SubElement(model, "default")
+    friction = spell([config.friction, config.torsion, config.rolling])
+    solref = spell([config.contact_time, 1])
+    ET.SubElement(default, "geom", condim="6", friction=friction, solref=solref)
     assets = ET.SubElement(model, "asset")
     world = ET.SubElement(model, "worldbody")
     up = -gravity if np.any(gravity) else np.array([0.0, 0.0, 1.0])

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import xml.etree.ElementTree as ET
-from collections.abc import Sequence
 
+from brrp_cli.config.planning import RestConfig
 from brrp_cli.planning.body import Body
+from brrp_cli.planning.mjcf import Files
 from brrp_cli.planning.numbers import spell
 
 
-def urdf(body: Body, mesh_file: str, part_files: Sequence[str]) -> str:
-    """A robot of one link, whose origin is the body's; files are named beside the URDF."""
+def urdf(body: Body, files: Files, config: RestConfig) -> str:
+    """A robot of one link, whose origin is the body's; files are named beside the URDF. Friction
+    stands where PyBullet reads it; other readers of URDF pass over it."""
     robot = ET.Element("robot", name=body.name)
     link = ET.SubElement(robot, "link", name=body.name)
     inertial = ET.SubElement(link, "inertial")
@@ -20,10 +22,14 @@ def urdf(body: Body, mesh_file: str, part_files: Sequence[str]) -> str:
     names = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
     values = (xx, xy, xz, yy, yz, zz)
     ET.SubElement(inertial, "inertia", {n: spell([v]) for n, v in zip(names, values, strict=True)})
-    visual = _with_mesh(link, "visual", mesh_file)
+    contact = ET.SubElement(link, "contact")
+    ET.SubElement(contact, "lateral_friction", value=spell([config.friction]))
+    ET.SubElement(contact, "spinning_friction", value=spell([config.torsion]))
+    ET.SubElement(contact, "rolling_friction", value=spell([config.rolling]))
+    visual = _with_mesh(link, "visual", files.mesh)
     material = ET.SubElement(visual, "material", name=f"{body.name}_colour")
     ET.SubElement(material, "color", rgba=spell([*body.colour, 1.0]))
-    for file in part_files:
+    for file in files.parts:
         _with_mesh(link, "collision", file)
     ET.indent(robot)
     return '<?xml version="1.0"?>\n' + ET.tostring(robot, encoding="unicode") + "\n"

@@ -1,21 +1,26 @@
-"""The folder of a plan: meshes, URDF, MJCF, a cuRobo world, one GLB and a record."""
+"""The folder of a plan: meshes, URDF, MJCF, a cuRobo world, MoveIt's scene, one GLB, a record."""
 
 from __future__ import annotations
 
 import json
 from collections.abc import Iterable
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from brrp_cli.config.planning import RestConfig
 from brrp_cli.errors import ResultError
 from brrp_cli.files import atomic_folder
 from brrp_cli.planning.body import Body
 from brrp_cli.planning.curobo import curobo_world
 from brrp_cli.planning.mjcf import Files, Table, body_mjcf, scene_mjcf
+from brrp_cli.planning.moveit import planning_scene, scene_text
+from brrp_cli.planning.moveit_grasps import grasp_frames, grasp_messages, stored_grasps
 from brrp_cli.planning.options import PlanOptions
+from brrp_cli.planning.rest import Rest, put_to_rest
 from brrp_cli.planning.scene import PlannedObject, planned_objects, table_under, upwards
 from brrp_cli.planning.urdf import urdf
 from brrp_cli.raycast import raycasting_scene
@@ -29,6 +34,7 @@ if TYPE_CHECKING:
 SCHEMA = 1
 RECORD = "plan.json"
 WORLD, SCENE, GLB = "world.yml", "scene.xml", "scene.glb"
+MOVEIT, MOVEIT_SCENE, MOVEIT_GRASPS = "moveit.scene", "moveit.json", "moveit_grasps.json"
 TABLE_COLOUR = (180, 168, 150, 255)
 
 
@@ -56,14 +62,21 @@ def write_plan(
         objects = list(planned_objects(stored, options) if planned is None else planned)
         bodies = {each.body.name: each.body for each in objects}
         table = table_under(list(bodies.values()), stored.plane)
+        config, resting = RestConfig(), {}
+        if options.rests and table is not None:
+            resting = put_to_rest(bodies, table, config)
+            bodies = {n: replace(body, parts=resting[n].parts) for n, body in bodies.items()}
+        poses = {name: rest.T_frame_body for name, rest in resting.items()} or None
         files = {name: _write_meshes(body, partial, options) for name, body in bodies.items()}
         for name, body in bodies.items():
-            (partial / f"{name}.urdf").write_text(urdf(body, files[name].mesh, files[name].parts))
-            (partial / f"{name}.xml").write_text(body_mjcf(body, files[name]))
-        (partial / SCENE).write_text(scene_mjcf(bodies, files, table))
+            (partial / f"{name}.urdf").write_text(urdf(body, files[name], config))
+            (partial / f"{name}.xml").write_text(body_mjcf(body, files[name], config))
+        (partial / SCENE).write_text(scene_mjcf(bodies, files, table, config, poses))
         (partial / WORLD).write_text(curobo_world(bodies, table, stored.record["frame"]))
+        if options.moveit is not None:
+            _write_moveit(stored, partial, bodies, table, options.moveit)
         _glb(bodies, table).export(partial / GLB)
-        record = _record(stored, options, objects, files, table)
+        record = _record(stored, options, objects, files, table, resting, config)
         (partial / RECORD).write_text(json.dumps(record, indent=2) + "\n")
     return record
 
@@ -83,6 +96,26 @@ def _write_meshes(body: Body, folder: Path, options: PlanOptions) -> Files:
     if options.confidence is not None:
         _save(body.collision, folder / "meshes" / f"{body.name}_inside.obj")
     return names
+
+
+def _write_moveit(
+    stored: StoredResult,
+    folder: Path,
+    bodies: dict[str, Body],
+    table: Table | None,
+    frame_id: str,
+) -> None:
+    """Its text file and its message, and the grasps of the results where there are any. Errors:
+    ResultError for a grasps.json that cannot be read."""
+    frame_id = frame_id or str(stored.record["frame"])
+    found = stored_grasps(stored.folder)
+    frames = grasp_frames(found)
+    (folder / MOVEIT).write_text(scene_text(bodies, table, frames))
+    message = planning_scene(bodies, table, frames, frame_id)
+    (folder / MOVEIT_SCENE).write_text(json.dumps(message) + "\n")
+    if found:
+        messages = grasp_messages(found, upwards(stored), frame_id)
+        (folder / MOVEIT_GRASPS).write_text(json.dumps(messages, indent=1) + "\n")
 
 
 def _save(mesh: trimesh.Trimesh, path: Path) -> None:
@@ -116,6 +149,8 @@ def _record(
     objects: list[PlannedObject],
     files: dict[str, Files],
     table: Table | None,
+    resting: dict[str, Rest],
+    config: RestConfig,
 ) -> dict[str, Any]:
     meshed = [each.object_id for each in objects]
     return {
@@ -129,11 +164,15 @@ def _record(
         "margin": options.margin,
         "density": options.density,
         "seed": options.seed,
+        "rest": asdict(config) if resting else None,
         "up": upwards(stored).tolist(),
         "table": None
         if table is None
         else {"T_frame_table": table.T_frame_table.tolist(), "size": table.size.tolist()},
-        "objects": [_object_record(each, files[each.body.name]) for each in objects],
+        "objects": [
+            _object_record(each, files[each.body.name], resting.get(each.body.name))
+            for each in objects
+        ],
         "left_out": [
             {"id": item["id"], "why": item["message"] or item["status"]}
             for item in stored.record["objects"]
@@ -142,7 +181,7 @@ def _record(
     }
 
 
-def _object_record(each: PlannedObject, files: Files) -> dict[str, Any]:
+def _object_record(each: PlannedObject, files: Files, rest: Rest | None) -> dict[str, Any]:
     body, region = each.body, each.region
     record: dict[str, Any] = {
         "id": each.object_id,
@@ -156,6 +195,19 @@ def _object_record(each: PlannedObject, files: Files) -> dict[str, Any]:
         "mjcf": f"{body.name}.xml",
         "mesh": files.mesh,
         "parts": list(files.parts),
+        "rest": None
+        if rest is None
+        else {
+            "T_frame_body": rest.T_frame_body.tolist(),
+            "moved_mm": 1000 * rest.moved,
+            "turned_degrees": rest.turned,
+            "foot_mm": 1000 * rest.foot,
+            "plate": rest.plate,
+            "left_alone": {
+                "moved_mm": 1000 * rest.left_moved,
+                "turned_degrees": rest.left_turned,
+            },
+        },
     }
     if region is not None:
         margin = margins(body)

@@ -8,6 +8,7 @@ import trimesh
 from table_scene import placed, stored
 
 from brrp_cli.config import SurfaceConfig
+from brrp_cli.config.grasping import GraspConfig
 from brrp_cli.geometry import similarity
 from brrp_cli.inference.placed_shape import PlacedShape
 from brrp_cli.raycast import inside
@@ -23,9 +24,9 @@ def shape_of(name):
     return PlacedShape(name, item.shape, T, 0.001, 5.0, np.zeros((6, 6)))
 
 
-def region(shape, reach):
+def region(shape, reach, config=CONFIG):
     reach = np.broadcast_to(reach, len(shape.vertices))
-    axes = around_axes(shape, float(reach.max()), CONFIG)
+    axes = around_axes(shape, float(reach.max()), config)
     return trimesh.Trimesh(
         *marching_cubes_of(-beyond_reach(shape, reach, axes, 0.0), axes), process=False
     )
@@ -61,3 +62,13 @@ def test_each_vertex_has_a_reach_of_its_own():
     height = np.asarray(found.vertices) @ placed(0, 0, 0)[:3, 2]
     assert distance[height > high.max() - 0.01].max() == pytest.approx(0.004, abs=0.0006)
     assert distance[height < high.min() + 0.01].max() == pytest.approx(0.001, abs=0.0006)
+
+
+@pytest.mark.parametrize("name", ["box", "ell"])
+def test_the_coarser_grid_of_grasps_still_holds_the_shape(name):
+    shape = shape_of(name)
+    coarse = SurfaceConfig(around_nodes=GraspConfig().neighbour_nodes)
+    found = region(shape, 0.0015, coarse)
+    assert inside(found, shape.vertices).all()
+    distance = shape.signed_distance(np.asarray(found.vertices), 0.01)
+    assert distance.mean() == pytest.approx(0.0015, abs=0.0002)

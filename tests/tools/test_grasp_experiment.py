@@ -5,11 +5,25 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import trimesh
+from PIL import Image
 
 pytest.importorskip("mujoco")
 from grasp_trial.bodies import TrueBody
+from grasp_trial.film import HEIGHT, WIDTH, Film, Take, is_target
 from grasp_trial.report import report
-from grasp_trial.trial import HELD, HIT_NEIGHBOUR, HIT_TABLE, MISSED, SLIPPED, Trials
+from grasp_trial.trial import (
+    CLOSED,
+    HELD,
+    HIT_NEIGHBOUR,
+    HIT_TABLE,
+    IN,
+    LIFTED,
+    MISSED,
+    PRE_GRASP,
+    SHAKEN,
+    SLIPPED,
+    Trials,
+)
 
 from brrp_cli.grasping.gripper_file import open_gripper
 from brrp_cli.shapes import solids
@@ -77,6 +91,29 @@ def test_the_same_grasp_ends_the_same(trials):
     assert first == second
 
 
+def test_the_film_shows_a_box_that_rises_and_a_hand_that_fails(trials, tmp_path):
+    film = Film(held=1, failed=1)
+    for T in (from_above(0.0, -0.01), from_above(0.0, 0.06)):
+        take = Take(trials.model, "object_1", np.array([0, 0, 0.06]))
+        result = trials.attempt(1, T, 0.08, APPROACH, take).result
+        assert film.wants(result)
+        film.add("default", result, take)
+        assert not film.wants(result)
+    assert [label for label, _ in film.rows] == [f"default: {HIT_TABLE}", f"default: {HELD}"]
+    failed, held = (pictures for _, pictures in film.rows)
+    # The table is hit before the hand comes in: one picture.
+    assert [picture is not None for picture in failed] == [True, False, False, False, False]
+    rows = [np.nonzero(is_target(picture))[0].mean() for picture in held]
+    assert list(take.states) == [PRE_GRASP, IN, CLOSED, LIFTED, SHAKEN]
+    assert rows[0] == pytest.approx(rows[2], abs=6)
+    assert rows[3] < rows[2] - 40 and rows[4] == pytest.approx(rows[3], abs=15)
+    film.save(tmp_path / "film.png")
+    sheet = np.asarray(Image.open(tmp_path / "film.png"))
+    assert sheet.shape[1] == 5 * WIDTH and sheet.shape[0] > 2 * HEIGHT
+    # Those that held come first.
+    assert np.array_equal(sheet[-HEIGHT:, :WIDTH], failed[0])
+
+
 def test_the_report_counts_what_was_carried_out():
     rows = []
     for scene in range(10):
@@ -90,6 +127,7 @@ def test_the_report_counts_what_was_carried_out():
     told = report(rows, drift=0.005)
     assert "| default | prior | 90% (70% to 100%), 10 | 10 of 11 |" in told
     assert "| mean mesh | prior | 50% (20% to 80%), 10 | 10 of 10 |" in told
-    assert "| default | 9 | 0 | 0 | 0 | 0 | 1 | 0 |" in told
+    assert "| default | 10 | 9 (70% to 100%) | 0 | 0 | 0 | 0 | 1 (0% to 30%) | 0 |" in told
+    assert "| mean mesh | prior | +40% (" in told
     assert "| 0.9 to 0.97 | 10 | 0.90 | 90%" in told and "calibration error: 0.00" in told
     assert "10 objects of which both plan a grasp: +40%" in told

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Sequence
 from itertools import pairwise
 from typing import Any
@@ -26,7 +25,8 @@ def report(rows: Sequence[Row], drift: float) -> str:
     return "\n\n".join(
         [
             _success(rows, sets, methods, rng),
-            _failures(rows, methods),
+            _failures(rows, methods, rng),
+            _against(rows, sets, methods, rng),
             _reliability([r for r in rows if r["method"] == "default"], rng),
             _difference(rows, rng),
         ]
@@ -44,7 +44,12 @@ def _best(rows: Sequence[Row], **which: str) -> list[Row]:
 def _told(found: Interval) -> str:
     if found.count == 0:
         return "-"
-    return f"{found.value:.0%} ({found.low:.0%} to {found.high:.0%}), {found.count}"
+    return f"{found.value:.0%}{_between(found.low, found.high)}, {found.count}"
+
+
+def _between(low: float, high: float, sign: str = "") -> str:
+    """Such as " (20% to 40%)"; nothing where one scene gives no interval."""
+    return "" if np.isnan(low) else f" ({low:{sign}.0%} to {high:{sign}.0%})"
 
 
 def _success(
@@ -66,15 +71,55 @@ def _success(
     return "\n".join(lines)
 
 
-def _failures(rows: Sequence[Row], methods: list[str]) -> str:
+def _failures(rows: Sequence[Row], methods: list[str], rng: np.random.Generator) -> str:
+    """How the best grasps that were carried out ended: counts, and shares over scenes."""
     lines = [
-        "| method | " + " | ".join(OUTCOMES) + " |",
-        "| --- |" + " --- |" * len(OUTCOMES),
+        "| method | grasps | " + " | ".join(OUTCOMES) + " |",
+        "| --- | --- |" + " --- |" * len(OUTCOMES),
     ]
     for method in methods:
-        counts = Counter(row["result"] for row in _best(rows, method=method))
-        lines.append(f"| {method} | " + " | ".join(str(counts[each]) for each in OUTCOMES) + " |")
+        tried = [row for row in _best(rows, method=method) if row["result"] != "none"]
+        scenes = [row["scene"] for row in tried]
+        cells = []
+        for outcome in OUTCOMES:
+            found = mean_interval([float(row["result"] == outcome) for row in tried], scenes, rng)
+            count = sum(row["result"] == outcome for row in tried)
+            cells.append(f"{count}{_between(found.low, found.high)}" if count else "0")
+        lines.append(f"| {method} | {len(tried)} | " + " | ".join(cells) + " |")
     return "\n".join(lines)
+
+
+def _against(
+    rows: Sequence[Row], sets: list[str], methods: list[str], rng: np.random.Generator
+) -> str:
+    """By how much a larger share of the best grasps of `default` held than of another method's,
+    drawn by scene."""
+    lines = ["| default against | set | more held (95 %) |", "| --- | --- | --- |"]
+    for method in methods:
+        for name in sets if method != "default" else []:
+            both = [
+                [r for r in _best(rows, method=m, set=name) if r["result"] != "none"]
+                for m in ("default", method)
+            ]
+            if not all(both):
+                continue
+            scenes = sorted({row["scene"] for mine in both for row in mine})
+            sums = np.zeros((len(scenes), 4))
+            for i, mine in enumerate(both):
+                for row in mine:
+                    sums[scenes.index(row["scene"]), 2 * i : 2 * i + 2] += [
+                        row["result"] == HELD,
+                        1,
+                    ]
+            value, low, high = cluster_bootstrap(sums, _gap, rng)
+            lines.append(f"| {method} | {name} | {value:+.0%}{_between(low, high, '+')} |")
+    return "\n".join(lines)
+
+
+def _gap(totals: np.ndarray) -> np.ndarray:
+    """Of totals (r, 4), held and tried of two methods: (r,)."""
+    with np.errstate(invalid="ignore"):
+        return np.asarray(totals[:, 0] / totals[:, 1] - totals[:, 2] / totals[:, 3])
 
 
 def _reliability(rows: Sequence[Row], rng: np.random.Generator) -> str:
@@ -91,7 +136,7 @@ def _reliability(rows: Sequence[Row], rng: np.random.Generator) -> str:
             share = mean_interval(held[mine], scenes[mine].tolist(), rng)
             lines.append(
                 f"| {low:g} to {min(high, 1):g} | {mine.sum()} | {score[mine].mean():.2f} |"
-                f" {share.value:.0%} ({share.low:.0%} to {share.high:.0%}) |"
+                f" {share.value:.0%}{_between(share.low, share.high)} |"
             )
     if len(tried):
         gap = [abs(held[which == i].sum() - score[which == i].sum()) for i in np.unique(which)]
@@ -117,5 +162,5 @@ def _difference(rows: Sequence[Row], rng: np.random.Generator) -> str:
     value, low, high = cluster_bootstrap(sums, lambda t: t[:, 0] / t[:, 1], rng)
     return (
         f"Ranking by the posterior's score against the mean mesh, {len(both)} objects of which "
-        f"both plan a grasp: {value:+.0%} ({low:+.0%} to {high:+.0%})."
+        f"both plan a grasp: {value:+.0%}{_between(low, high, '+')}."
     )

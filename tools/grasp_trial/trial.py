@@ -20,6 +20,8 @@ Array = NDArray[np.float64]
 HELD = "held"
 HIT_TABLE, HIT_NEIGHBOUR, HIT_OBJECT = "hit the table", "hit a neighbour", "hit the object"
 MISSED, SLIPPED, DROPPED = "closed on nothing", "slipped", "dropped"
+# Ends of phases, as `watch` is told them.
+PRE_GRASP, IN, CLOSED, LIFTED, SHAKEN = "pre-grasp", "come in", "closed", "lifted", "shaken"
 OUTCOMES = (HELD, HIT_OBJECT, HIT_NEIGHBOUR, HIT_TABLE, MISSED, SLIPPED, DROPPED)
 
 SETTLE, APPROACH, CLOSE, LIFT, SHAKE = 0.2, 0.4, 0.5, 0.6, 0.8  # seconds
@@ -74,24 +76,25 @@ class Trials:
         data = self.mj.MjData(self.model)
         data.qpos[:], data.qvel[:] = self.start.qpos, 0
         before = {i: self._where(data, i, forward=True) for i in self.ids}
+        self._place(data, back_along(T, approach), opening)
+        watch(PRE_GRASP, data)
         if self.gripper.lowest(T[None], np.array([opening]), TABLE)[0] < 0:
             return HIT_TABLE
-        self._place(data, back_along(T, approach), opening)
         hit = self._come_in(data, T, approach, object_id, before)
-        watch("in", data)
+        watch(IN, data)
         if hit:
             return hit
         touched = self._close(data, object_id)
-        watch("closed", data)
+        watch(CLOSED, data)
         if self._width(data) < 5e-4:
             return SLIPPED if touched else MISSED
         held = self._where(data, object_id)
         self._run(data, LIFT, lambda s: T + _at([0, 0, HEIGHT * _smooth(s)]))
-        watch("lifted", data)
+        watch(LIFTED, data)
         if self._where(data, object_id)[2] - held[2] < ROSE * HEIGHT:
             return SLIPPED
         self._run(data, SHAKE, lambda s: _shaken(T + _at([0, 0, HEIGHT]), s))
-        watch("shaken", data)
+        watch(SHAKEN, data)
         return HELD if self._where(data, object_id)[2] - held[2] > ROSE * HEIGHT else DROPPED
 
     def _come_in(

@@ -16,6 +16,7 @@ from brrp_cli.planning.options import DENSITY
 from grasp_trial.bodies import TrueBody
 
 STEP = 0.001  # seconds
+TABLE_NAME = "table"
 # Contacts yield by force / mass x this time squared: what weighs little is crushed otherwise.
 CONTACT_TIME = 0.002  # seconds
 LIGHTEST = 0.1  # kg
@@ -52,7 +53,9 @@ def world_xml(bodies: Sequence[TrueBody], gripper: Gripper, friction: float) -> 
     assets = ET.SubElement(model, "asset")
     world = ET.SubElement(model, "worldbody")
     ET.SubElement(world, "light", pos="0 0 2", dir="0 0 -1", directional="true")
-    ET.SubElement(world, "geom", name="table", type="plane", size="2 2 0.1", rgba="0.7 0.66 0.6 1")
+    ET.SubElement(
+        world, "geom", name=TABLE_NAME, type="plane", size="2 2 0.1", rgba="0.7 0.66 0.6 1"
+    )
     for i, body in enumerate(bodies):
         _add_object(assets, world, body, i)
     _add_hand(model, world, gripper)
