@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from brrp_cli.config.ranges import between, share
+from brrp_cli.config.registration import SearchConfig
 
 
 @dataclass(frozen=True)
@@ -63,16 +64,54 @@ class SimilarityConfig:
         colours: about what an object that is rightly found has
     size_spread : height and both sides of the footprint differ by so much without meaning
         anything; size_share : and by that part of the stored one
+    blur : share of each colour that counts to either of the neighbouring bins of a* and b*: a plain
+        colour fills one bin, and the light tried may lie beside the true one
     smaller : weight of being smaller than the stored object, against being larger: a footprint is
         seen from one side; size_limit : squared spreads beyond which nothing more speaks against it
     """
 
     neutral_colour: float = share(0.93)
     neutral_pairs: float = share(0.97)
+    blur: float = share(0.2)
     size_spread: tuple[float, float, float] = (0.006, 0.008, 0.008)
     size_share: float = 0.06
     smaller: tuple[float, float, float] = (1.0, 0.15, 0.15)
     size_limit: float = 16.0
+
+
+@dataclass(frozen=True)
+class AlignmentConfig:
+    """Stored objects are laid over what is seen, which tells what colours and sizes cannot.
+
+    most : objects that are, those of the best likenesses; margin : nats by which their likeness may
+        be less than the best one's; least_points : of the object that have to be seen
+    neutral : alignment score where nothing can be aligned: about what an object that is rightly
+        found has; unaligned : that of objects that were not among those; lowest : a lower score
+        counts as that one
+    search : how they are placed (registration/quick_alignment.py)
+    """
+
+    most: int = 30
+    margin: float = 12.0
+    least_points: int = 20
+    neutral: float = 0.85
+    unaligned: float = 0.3
+    lowest: float = 0.3
+    search: SearchConfig = field(
+        default_factory=lambda: SearchConfig(
+            turns=16,
+            model_points=100,
+            seen_points=100,
+            first_share=2,
+            coarse=24,
+            coarse_points=60,
+            coarse_steps=6,
+            beaten=0.25,
+            fine=6,
+            fine_points=250,
+            fine_steps=6,
+        )
+    )
 
 
 @dataclass(frozen=True)
@@ -90,6 +129,7 @@ class FusionConfig:
     colour: float = 24.26
     pairs: float = 25.27
     size: float = 0.44
+    alignment: float = 12.0
     offset: float = between(9.88, -100.0, 100.0)
 
 
@@ -114,4 +154,5 @@ class RetrievalConfig:
     illuminants: IlluminantsConfig = field(default_factory=IlluminantsConfig)
     similarity: SimilarityConfig = field(default_factory=SimilarityConfig)
     fusion: FusionConfig = field(default_factory=FusionConfig)
+    alignment: AlignmentConfig = field(default_factory=AlignmentConfig)
     shortlist: ShortlistConfig = field(default_factory=ShortlistConfig)

@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -44,6 +46,15 @@ def test_the_formula_in_plain_numbers():
     item = seen([[0.9, 1.0]], pairs=(1.0, 0.8), size=(-3.0, 0.0), hidden=0.5)
     found = believe([item], np.zeros(1), np.eye(1), 2, WEIGHTS)[0]
     odds = np.exp([8 - 2 - 1.5, 8 - 2.0]) / 2
+    np.testing.assert_allclose(found, odds / (1 + odds.sum()), rtol=1e-5)
+
+
+def test_alignment_counts_for_each_object():
+    # Log odds 8 - 10 * 0.1 - ln 2 and 8 - 10 * 0.6 - ln 2.
+    item = replace(seen([[1.0, 1.0]]), alignment=np.array([0.9, 0.4], np.float32))
+    weights = replace(WEIGHTS, alignment=10.0)
+    found = believe([item], np.zeros(1), np.eye(1), 2, weights)[0]
+    odds = np.exp([7.0, 2.0]) / 2
     np.testing.assert_allclose(found, odds / (1 + odds.sum()), rtol=1e-5)
 
 
