@@ -67,7 +67,9 @@ class SimilarityConfig:
     blur : share of each colour that counts to either of the neighbouring bins of a* and b*: a plain
         colour fills one bin, and the light tried may lie beside the true one
     smaller : weight of being smaller than the stored object, against being larger: a footprint is
-        seen from one side; size_limit : squared spreads beyond which nothing more speaks against it
+        seen from one side; size_limit : squared spreads beyond which nothing more speaks against
+        it; size_most : what speaks against all three at most, since an object that leans on
+        others, or lies on them, stands in no resting pose on the plane
     """
 
     neutral_colour: float = share(0.93)
@@ -77,14 +79,15 @@ class SimilarityConfig:
     size_share: float = 0.06
     smaller: tuple[float, float, float] = (1.0, 0.15, 0.15)
     size_limit: float = 16.0
+    size_most: float = 6.0
 
 
 @dataclass(frozen=True)
 class AlignmentConfig:
     """Stored objects are laid over what is seen, which tells what colours and sizes cannot.
 
-    most : objects that are, those of the best likenesses; margin : nats by which their likeness may
-        be less than the best one's; least_points : of the object that have to be seen
+    most : objects that are, the most probable by their likenesses; margin : nats by which theirs
+        may be less than the best one's; least_points : of the object that have to be seen
     neutral : alignment score where nothing can be aligned: about what an object that is rightly
         found has; unaligned : that of objects that were not among those; lowest : a lower score
         counts as that one
@@ -148,11 +151,17 @@ class ShortlistConfig:
 
 @dataclass(frozen=True)
 class RetrievalConfig:
-    """P(c|R) by appearance."""
+    """P(c|R) by appearance. likeness : what decides which objects are aligned; fusion : P(c|R) with
+    the alignment scores."""
 
     observed: ObservedAppearanceConfig = field(default_factory=ObservedAppearanceConfig)
     illuminants: IlluminantsConfig = field(default_factory=IlluminantsConfig)
     similarity: SimilarityConfig = field(default_factory=SimilarityConfig)
+    likeness: FusionConfig = field(
+        default_factory=lambda: FusionConfig(
+            colour=24.26, pairs=25.27, size=0.44, alignment=0.0, offset=9.88
+        )
+    )
     fusion: FusionConfig = field(default_factory=FusionConfig)
     alignment: AlignmentConfig = field(default_factory=AlignmentConfig)
     shortlist: ShortlistConfig = field(default_factory=ShortlistConfig)

@@ -8,11 +8,13 @@ which tells models apart long before that.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import permutations, product
 
 import numpy as np
 from numpy.typing import NDArray
 
 from brrp_cli.config import SearchConfig
+from brrp_cli.observation.support_plane import Plane
 from brrp_cli.registration.initial_poses import resting_initial_poses
 from brrp_cli.registration.model import ModelGeometry
 from brrp_cli.registration.sdf_refinement import refine_to_sdf
@@ -49,7 +51,14 @@ def _coarse(model: ModelGeometry, verifier: Verifier, config: SearchConfig) -> t
     """The `fine` best placements T_cam_model (B, 4, 4) after a coarse refinement, and the best
     score."""
     assert verifier.plane is not None
-    T = np.stack(resting_initial_poses(model, verifier.points, verifier.plane, config))
+    resting = np.stack(resting_initial_poses(model, verifier.points, verifier.plane, config))
+    T = np.concatenate(
+        [
+            resting,
+            raised_poses(resting, model, verifier.points, verifier.plane, config),
+            principal_poses(model, verifier.points),
+        ]
+    )
     first = _scores(T, model, verifier, config, config.seen_points // config.first_share)
     T = T[np.argsort(-first, kind="stable")[: config.coarse]]
     T = _refined(
@@ -58,6 +67,49 @@ def _coarse(model: ModelGeometry, verifier: Verifier, config: SearchConfig) -> t
     score = _scores(T, model, verifier, config, config.seen_points)
     order = np.argsort(-score, kind="stable")[: config.fine]
     return np.asarray(T[order]), float(score[order[0]])
+
+
+def raised_poses(
+    resting: Array, model: ModelGeometry, seen: Array, plane: Plane, config: SearchConfig
+) -> Array:
+    """Those of the resting poses T_cam_model (B, 4, 4) whose top is lower than that of the seen
+    points (n, 3) by more than `hidden`, raised to it: an object that lies on others."""
+    top = np.quantile(plane.signed_distance(seen), 1 - config.stray)
+    placed = resting[:, :3, :3] @ model.surface.T + resting[:, :3, 3:]
+    missing = top - (plane.signed_distance(placed.swapaxes(1, 2).reshape(-1, 3))).reshape(
+        len(resting), -1
+    ).max(axis=1)
+    raised = resting.copy()
+    raised[:, :3, 3] += missing[:, None] * plane.normal
+    return raised[missing > config.hidden]
+
+
+def principal_poses(model: ModelGeometry, seen: Array) -> Array:
+    """T_cam_model (24, 4, 4) that lay the model's principal axes along those of seen points (n, 3),
+    in every order and sense, middle on middle: an object that leans on others."""
+    middle, own = seen.mean(axis=0), model.surface.mean(axis=0)
+    axes = np.linalg.svd(seen - middle, full_matrices=False)[2]
+    own_axes = np.linalg.svd(model.surface - own, full_matrices=False)[2]
+    # Right-handed, both: what turns one into the other is no mirror.
+    axes[2] *= np.linalg.det(axes)
+    own_axes[2] *= np.linalg.det(own_axes)
+    T = np.tile(np.eye(4), (len(_CUBE), 1, 1))
+    T[:, :3, :3] = axes.T @ _CUBE @ own_axes
+    T[:, :3, 3] = middle - T[:, :3, :3] @ own
+    return T
+
+
+def _rotations_of_a_cube() -> Array:
+    """(24, 3, 3)."""
+    signed = [
+        np.eye(3)[list(order)] * np.array(signs)[:, None]
+        for order in permutations(range(3))
+        for signs in product((1, -1), repeat=3)
+    ]
+    return np.stack([matrix for matrix in signed if np.linalg.det(matrix) > 0])
+
+
+_CUBE = _rotations_of_a_cube()
 
 
 def _scores(

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brrp_cli.config import Config
+from brrp_cli.config.retrieval import FusionConfig
 from brrp_cli.errors import RetrievalError
 from brrp_cli.frames.frame import BACKGROUND, Frame
 from brrp_cli.observation.ray_samples import box_center
@@ -56,7 +57,7 @@ class AppearanceRetriever:
         """P(c|R) (n,) for one object of the frame, in the order of the prior's names; sum <= 1."""
         if frame is not self._frame:
             found = self.evidence(frame)
-            answers = self._believe(list(found.values()))
+            answers = self._believe(list(found.values()), self._config.retrieval.fusion)
             self._answers = dict(zip(found, answers, strict=True))
             self._frame = frame
         if object_id not in self._answers:
@@ -83,7 +84,7 @@ class AppearanceRetriever:
             points[object_id] = seen.points
         if plane is None:
             return {i: replace(look, alignment=own.alignment.neutral) for i, look in looks.items()}
-        likely = self._believe(list(looks.values()))
+        likely = self._believe(list(looks.values()), own.likeness)
         return {
             i: self._aligned(look, probabilities[look.rows], points[i], frame, plane)
             for (i, look), probabilities in zip(looks.items(), likely, strict=True)
@@ -110,13 +111,15 @@ class AppearanceRetriever:
         alignment[chosen] = np.maximum(found, own.lowest)
         return replace(look, alignment=alignment)
 
-    def _believe(self, evidence: Sequence[Similarity]) -> list[NDArray[np.float64]]:
+    def _believe(
+        self, evidence: Sequence[Similarity], weights: FusionConfig
+    ) -> list[NDArray[np.float64]]:
         return believe(
             evidence,
             self._light,
             self._local,
             len(self._looks),
-            self._config.retrieval.fusion,
+            weights,
         )
 
     def plane(self, frame: Frame) -> Plane | None:

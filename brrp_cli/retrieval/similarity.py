@@ -76,7 +76,8 @@ def size_penalty(
     weight = np.array(config.smaller, dtype=np.float32)
     smaller = np.minimum(np.maximum(-off, 0) ** 2 * weight, limit)
     against = (larger + np.float32((1 - hidden) ** 2) * smaller).sum(axis=-1)
-    return np.asarray(-np.nanmin(against, axis=-1) / 2, dtype=np.float32)
+    least = np.minimum(np.nanmin(against, axis=-1) / 2, np.float32(config.size_most))
+    return np.asarray(-least, dtype=np.float32)
 
 
 def similarity(
