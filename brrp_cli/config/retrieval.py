@@ -86,8 +86,10 @@ class SimilarityConfig:
 class AlignmentConfig:
     """Stored objects are laid over what is seen, which tells what colours and sizes cannot.
 
-    most : objects that are, the most probable by their likenesses; margin : nats by which theirs
-        may be less than the best one's; least_points : of the object that have to be seen
+    most : objects that are, the most probable by their likenesses; where none of them reaches the
+        score `enough`, so are the next `more`: what leans on others, or is hidden in part, is less
+        alike; margin : nats by which theirs may be less than the best one's; least_points : of the
+        object that have to be seen
     neutral : alignment score where nothing can be aligned: about what an object that is rightly
         found has; unaligned : that of objects that were not among those; lowest : a lower score
         counts as that one
@@ -95,6 +97,8 @@ class AlignmentConfig:
     """
 
     most: int = 30
+    enough: float = share(0.8)
+    more: int = 40
     margin: float = 12.0
     least_points: int = 20
     neutral: float = 0.85
@@ -119,21 +123,20 @@ class AlignmentConfig:
 
 @dataclass(frozen=True)
 class FusionConfig:
-    r"""Inverse temperatures of the likenesses and the offset of the log odds: see
+    r"""Inverse temperatures of the likenesses and of the alignment score, and the offset of the log
+    odds, which falls by `crowding` with the logarithm of the prior's size: see
     brrp_cli/retrieval/score_fusion.py.
 
-    Fitted by tools/fit_appearance.py on made scenes of 50 YCB objects of the prior (30), of 7
-    others (10) and of random shapes (10), seed 3000:
-      python tools/make_scenes.py --meshes MESHES --noise structured-light --light varied \
-        --seed 3000
-      python tools/fit_appearance.py --prior prior/ fit_prior/ fit_unseen/ fit_other/
+    Fitted by tools/fit_appearance.py on made scenes, seeds 51100 to 51400, and priors of 50 and 274
+    objects; docs/retrieval.md has the commands.
     """
 
-    colour: float = 24.26
-    pairs: float = 25.27
-    size: float = 0.44
-    alignment: float = 12.0
-    offset: float = between(9.88, -100.0, 100.0)
+    colour: float = 23.9
+    pairs: float = 8.8
+    size: float = 0.24
+    alignment: float = between(13.5, 0.0, 1000.0)
+    offset: float = between(6.4, -100.0, 100.0)
+    crowding: float = between(0.1, 0.0, 10.0)
 
 
 @dataclass(frozen=True)
@@ -159,7 +162,7 @@ class RetrievalConfig:
     similarity: SimilarityConfig = field(default_factory=SimilarityConfig)
     likeness: FusionConfig = field(
         default_factory=lambda: FusionConfig(
-            colour=24.26, pairs=25.27, size=0.44, alignment=0.0, offset=9.88
+            colour=24.26, pairs=25.27, size=0.44, alignment=0.0, offset=9.88, crowding=1.0
         )
     )
     fusion: FusionConfig = field(default_factory=FusionConfig)

@@ -102,13 +102,18 @@ class AppearanceRetriever:
         own = self._config.retrieval.alignment
         if len(points) < own.least_points:
             return replace(look, alignment=own.neutral)
-        order = np.argsort(-likely, kind="stable")[: own.most]
-        chosen = np.sort(order[likely[order] > likely[order[0]] * np.exp(-own.margin)])
-        names = [self._names[row] for row in look.rows[chosen]]
+        order = np.argsort(-likely, kind="stable")
+        order = order[likely[order] > likely[order[0]] * np.exp(-own.margin)]
         shuffled = points[np.random.default_rng(self._seed).permutation(len(points))]
         alignment = np.full(len(look.rows), own.unaligned, np.float32)
-        found = self._aligner.scores(shuffled, frame, plane, names)
-        alignment[chosen] = np.maximum(found, own.lowest)
+        for chosen in (order[: own.most], order[own.most : own.most + own.more]):
+            # In the prior's order, in which shards hold them.
+            chosen = np.sort(chosen)
+            names = [self._names[row] for row in look.rows[chosen]]
+            found = self._aligner.scores(shuffled, frame, plane, names)
+            alignment[chosen] = np.maximum(found, own.lowest)
+            if found.max(initial=0.0) >= own.enough:
+                break
         return replace(look, alignment=alignment)
 
     def _believe(

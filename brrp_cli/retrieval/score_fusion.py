@@ -3,7 +3,7 @@
 For object i of the frame, stored object c and light g, with n stored objects:
 
     s_i(c, g) = offset + colour (B_i(c, g) - 1) + pairs (1 - h_i) (D_i(c) - 1) + size Z_i(c)
-                + alignment (A_i(c) - 1) - ln n
+                + alignment (A_i(c) - 1) - crowding ln n
 
 B and D are Bhattacharyya coefficients of colours and of point pairs, in [0, 1], h the hidden share
 of the silhouette, Z <= 0 what speaks against the size and A <= 1 the alignment score of c laid over
@@ -74,4 +74,4 @@ def _log_odds(item: Similarity, count: int, weights: FusionConfig) -> NDArray[np
     shape = weights.pairs * (1 - item.hidden) * (item.pairs - 1) + weights.size * item.size
     shape = shape + weights.alignment * (item.alignment - 1)
     colour = weights.colour * (item.colour.astype(np.float64) - 1)
-    return np.asarray(weights.offset + colour + shape - np.log(count))
+    return np.asarray(weights.offset + colour + shape - weights.crowding * np.log(count))
