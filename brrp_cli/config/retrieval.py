@@ -127,8 +127,9 @@ class FusionConfig:
     odds, which falls by `crowding` with the logarithm of the prior's size: see
     brrp_cli/retrieval/score_fusion.py.
 
-    Fitted by tools/fit_appearance.py on made scenes, seeds 51100 to 51400, and priors of 50 and 274
-    objects; docs/retrieval.md has the commands.
+    Fitted by tools/fit_appearance.py on made scenes, seeds 51100 to 51400, and a prior of 274
+    objects; `offset` and `crowding` were set between what fits that one and one of 50.
+    docs/retrieval.md has the commands.
     """
 
     colour: float = 23.9
