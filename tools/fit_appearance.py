@@ -2,10 +2,13 @@
 
     python tools/fit_appearance.py --prior prior/ fit_prior/ fit_unseen/ fit_other/
     python tools/fit_appearance.py --prior prior/ --report test_prior/ test_unseen/ test_other/
+    python tools/fit_appearance.py --prior prior/ --absent --report test_prior/
 
 Scenes of objects that the prior holds and of others, made with `tools/make_scenes.py --noise
 structured-light --light varied`; every view counts. What is minimised is the mean of -ln P(what it
-is | R), where what is not in the prior is one more class. Printed are the values for
+is | R), where what is not in the prior is one more class. With `--absent` every view counts once
+more with the true objects left out of the prior: strangers of the same kinds. Several `--prior` fit
+one set of constants to priors of different sizes. Printed are the values for
 FusionConfig in brrp_cli/config/retrieval.py, and what becomes of each set.
 """
 
@@ -13,7 +16,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Sequence
-from dataclasses import astuple, dataclass
+from dataclasses import astuple, dataclass, replace
 from pathlib import Path
 
 import click
@@ -36,37 +39,45 @@ from brrp_cli.retrieval.illuminants import lights, local_lights, log_prior
 from brrp_cli.retrieval.score_fusion import Similarity, believe
 
 LARGE = 500  # visible pixels
+TAKEN = 0.5  # probability
 
 
 @dataclass(frozen=True)
 class View:
-    """What one view shows: evidence, visible pixels and the true row (-1: not in the prior)."""
+    """What one view shows: evidence, visible pixels and the true row (-1: not in the prior), of
+    `count` objects."""
 
     group: str
+    count: int
     evidence: list[Similarity]
     pixels: list[int]
     truth: list[int]
 
 
 @click.command()
-@click.option("--prior", "prior_path", required=True, type=click.Path(path_type=Path))
+@click.option("--prior", "priors", required=True, multiple=True, type=click.Path(path_type=Path))
+@click.option("--absent", is_flag=True, help="Also as strangers: left out of the prior.")
 @click.option("--report", is_flag=True, help="Fit nothing: report with the constants in the code.")
 @click.argument("sets", nargs=-1, required=True, type=click.Path(path_type=Path))
-def main(prior_path: Path, report: bool, sets: tuple[Path, ...]) -> None:
+def main(priors: tuple[Path, ...], absent: bool, report: bool, sets: tuple[Path, ...]) -> None:
     """Fit on SETS, folders of scenes, and print constants and hit rates."""
+    views = []
     try:
-        prior = open_prior(prior_path)
-        views = [view for folder in sets for view in look(prior, folder)]
+        for path in priors:
+            prior = open_prior(path)
+            seen = [view for folder in sets for view in look(prior, folder)]
+            views += seen + ([left_out(view) for view in seen] if absent else [])
     except BrrpError as error:
         raise click.ClickException(str(error)) from error
-    count = len(prior.names)
-    weights = FusionConfig() if report else fit(views, count)
-    click.echo(f"{weights}, mean loss {loss(views, weights, count):.4f}")
-    click.echo(f"calibration error over all of them {calibration(views, weights, count):.3f}")
-    for folder in sets:
-        members = [view for view in views if view.group == folder.name]
-        for large in (True, False):
-            click.echo(line(folder.name, members, weights, count, large))
+    weights = FusionConfig() if report else fit(views)
+    click.echo(f"{weights}, mean loss {loss(views, weights):.4f}")
+    for count in sorted({view.count for view in views}):
+        members = [view for view in views if view.count == count]
+        click.echo(f"{count} objects: calibration error {calibration(members, weights):.3f}")
+        for group in dict.fromkeys(view.group for view in members):
+            for large in (True, False):
+                here = [view for view in members if view.group == group]
+                click.echo(f"{count}, {line(group, here, weights, large)}")
 
 
 def look(prior: Prior, folder: Path) -> list[View]:
@@ -81,6 +92,7 @@ def look(prior: Prior, folder: Path) -> list[View]:
             views.append(
                 View(
                     group=folder.name,
+                    count=len(prior.names),
                     evidence=list(found.values()),
                     pixels=[int(np.count_nonzero(frame.segmap == i)) for i in found],
                     truth=[prior.names.index(n) if n in prior.names else -1 for n in names],
@@ -89,21 +101,45 @@ def look(prior: Prior, folder: Path) -> list[View]:
     return views
 
 
-def fit(views: Sequence[View], count: int) -> FusionConfig:
+def left_out(view: View) -> View:
+    """What a prior without the true objects would have said."""
+    return replace(
+        view,
+        group=f"{view.group} left out",
+        evidence=[without(item, row) for item, row in zip(view.evidence, view.truth, strict=True)],
+        truth=[-1] * len(view.truth),
+    )
+
+
+def without(item: Similarity, row: int) -> Similarity:
+    """The evidence without one row of the prior."""
+    kept = item.rows != row
+    alignment = item.alignment[kept] if isinstance(item.alignment, np.ndarray) else item.alignment
+    return replace(
+        item,
+        rows=item.rows[kept],
+        colour=item.colour[:, kept],
+        pairs=item.pairs[kept],
+        size=item.size[kept],
+        alignment=alignment,
+    )
+
+
+def fit(views: Sequence[View]) -> FusionConfig:
     """The weights with the least loss. All of them are positive."""
     from scipy.optimize import minimize
 
     found = minimize(
-        lambda x: loss(views, FusionConfig(*np.exp(x)), count),
+        lambda x: loss(views, FusionConfig(*np.exp(x))),
         np.log(astuple(FusionConfig())),
         method="Nelder-Mead",
-        options={"xatol": 1e-2, "fatol": 1e-4, "maxfev": 150},
+        options={"xatol": 1e-2, "fatol": 1e-4, "maxfev": 200},
     )
     return FusionConfig(*(round(float(value), 2) for value in np.exp(found.x)))
 
 
 def answers(
-    views: Sequence[View], weights: FusionConfig, count: int
+    views: Sequence[View], weights: FusionConfig
 ) -> list[tuple[int, int, NDArray[np.float64]]]:
     """(true row, pixels, P(c|R)) of every object."""
     lit = IlluminantsConfig()
@@ -115,37 +151,35 @@ def answers(
         for truth, pixels, probabilities in zip(
             view.truth,
             view.pixels,
-            believe(view.evidence, light, local, count, weights),
+            believe(view.evidence, light, local, view.count, weights),
             strict=True,
         )
     ]
 
 
-def loss(views: Sequence[View], weights: FusionConfig, count: int) -> float:
+def loss(views: Sequence[View], weights: FusionConfig) -> float:
     """Mean of -ln P(what it is | R)."""
     found = [
         max(p[truth] if truth >= 0 else unknown(p), 1e-12)
-        for truth, _, p in answers(views, weights, count)
+        for truth, _, p in answers(views, weights)
     ]
     return float(-np.mean(np.log(found)))
 
 
-def calibration(views: Sequence[View], weights: FusionConfig, count: int) -> float:
+def calibration(views: Sequence[View], weights: FusionConfig) -> float:
     """Expected calibration error of the most probable of the prior's objects and of none."""
     sure, right = [], []
-    for truth, _, p in answers(views, weights, count):
+    for truth, _, p in answers(views, weights):
         best = -1 if unknown(p) > p.max() else int(p.argmax())
         sure.append(unknown(p) if best < 0 else float(p[best]))
         right.append(best == truth)
     return expected_calibration_error(np.array(sure), np.array(right))
 
 
-def line(name: str, views: Sequence[View], weights: FusionConfig, count: int, large: bool) -> str:
+def line(name: str, views: Sequence[View], weights: FusionConfig, large: bool) -> str:
     """Hit rates of one set, and how sure it is that the prior does not hold the object."""
     found = [
-        (truth, p)
-        for truth, pixels, p in answers(views, weights, count)
-        if pixels > LARGE or not large
+        (truth, p) for truth, pixels, p in answers(views, weights) if pixels > LARGE or not large
     ]
     ranks = np.array([1 + int((p > p[truth]).sum()) for truth, p in found if truth >= 0])
     parts = [f"{name}, {f'over {LARGE} pixels' if large else 'all'}: {len(found)} objects"]
@@ -155,6 +189,10 @@ def line(name: str, views: Sequence[View], weights: FusionConfig, count: int, la
         sure = [unknown(p) for truth, p in found if (truth >= 0) == inside]
         if sure:
             parts.append(f"P(not in prior) of those {label} it {np.mean(sure):.3f}")
+    strangers = [p for truth, p in found if truth < 0]
+    if strangers:
+        taken = np.mean([p.max(initial=0) > TAKEN for p in strangers])
+        parts.append(f"strangers taken for a stored one {taken:.3f}")
     return ", ".join(parts)
 
 

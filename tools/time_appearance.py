@@ -70,11 +70,15 @@ def main(prior_path: Path, frame_path: Path) -> None:
     start = time.process_time()
     lit = own.illuminants
     light, local = log_prior(gains, lit), local_lights(gains, lit)
-    answers = believe(found, light, local, len(looks), own.fusion)
+    answers = believe(found, light, local, len(looks), own.likeness)
     for answer in answers:
         top_k(answer, prior.names, preset("default").k)
     seconds["look up"] += time.process_time() - start
     stages = ", ".join(f"{k} {1e3 * v / len(found):.0f} ms" for k, v in seconds.items())
+    for stage in ("in all, with alignment, first", "again"):
+        start = time.process_time()
+        retriever.evidence(frame)
+        stages += f", {stage} {1e3 * (time.process_time() - start) / len(found):.0f} ms"
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e3
     click.echo(
         f"{len(looks)} objects: open {1e3 * opened:.0f} ms, descriptors {1e3 * started:.0f} ms; "

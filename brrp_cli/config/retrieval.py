@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from brrp_cli.config.ranges import between, share
+from brrp_cli.config.registration import SearchConfig
 
 
 @dataclass(frozen=True)
@@ -63,34 +64,80 @@ class SimilarityConfig:
         colours: about what an object that is rightly found has
     size_spread : height and both sides of the footprint differ by so much without meaning
         anything; size_share : and by that part of the stored one
+    blur : share of each colour that counts to either of the neighbouring bins of a* and b*: a plain
+        colour fills one bin, and the light tried may lie beside the true one
     smaller : weight of being smaller than the stored object, against being larger: a footprint is
-        seen from one side; size_limit : squared spreads beyond which nothing more speaks against it
+        seen from one side; size_limit : squared spreads beyond which nothing more speaks against
+        it; size_most : what speaks against all three at most, since an object that leans on
+        others, or lies on them, stands in no resting pose on the plane
     """
 
     neutral_colour: float = share(0.93)
     neutral_pairs: float = share(0.97)
+    blur: float = share(0.2)
     size_spread: tuple[float, float, float] = (0.006, 0.008, 0.008)
     size_share: float = 0.06
     smaller: tuple[float, float, float] = (1.0, 0.15, 0.15)
     size_limit: float = 16.0
+    size_most: float = 6.0
+
+
+@dataclass(frozen=True)
+class AlignmentConfig:
+    """Stored objects are laid over what is seen, which tells what colours and sizes cannot.
+
+    most : objects that are, the most probable by their likenesses; where none of them reaches the
+        score `enough`, so are the next `more`: what leans on others, or is hidden in part, is less
+        alike; margin : nats by which theirs may be less than the best one's; least_points : of the
+        object that have to be seen
+    neutral : alignment score where nothing can be aligned: about what an object that is rightly
+        found has; unaligned : that of objects that were not among those; lowest : a lower score
+        counts as that one
+    search : how they are placed (registration/quick_alignment.py)
+    """
+
+    most: int = 30
+    enough: float = share(0.8)
+    more: int = 40
+    margin: float = 12.0
+    least_points: int = 20
+    neutral: float = 0.85
+    unaligned: float = 0.3
+    lowest: float = 0.3
+    search: SearchConfig = field(
+        default_factory=lambda: SearchConfig(
+            turns=16,
+            model_points=100,
+            seen_points=100,
+            first_share=2,
+            coarse=24,
+            coarse_points=60,
+            coarse_steps=6,
+            beaten=0.25,
+            fine=6,
+            fine_points=250,
+            fine_steps=6,
+        )
+    )
 
 
 @dataclass(frozen=True)
 class FusionConfig:
-    r"""Inverse temperatures of the likenesses and the offset of the log odds: see
+    r"""Inverse temperatures of the likenesses and of the alignment score, and the offset of the log
+    odds, which falls by `crowding` with the logarithm of the prior's size: see
     brrp_cli/retrieval/score_fusion.py.
 
-    Fitted by tools/fit_appearance.py on made scenes of 50 YCB objects of the prior (30), of 7
-    others (10) and of random shapes (10), seed 3000:
-      python tools/make_scenes.py --meshes MESHES --noise structured-light --light varied \
-        --seed 3000
-      python tools/fit_appearance.py --prior prior/ fit_prior/ fit_unseen/ fit_other/
+    Fitted by tools/fit_appearance.py on made scenes, seeds 51100 to 51400, and a prior of 274
+    objects; `offset` and `crowding` were set between what fits that one and one of 50.
+    docs/retrieval.md has the commands.
     """
 
-    colour: float = 24.26
-    pairs: float = 25.27
-    size: float = 0.44
-    offset: float = between(9.88, -100.0, 100.0)
+    colour: float = 23.9
+    pairs: float = 8.8
+    size: float = 0.24
+    alignment: float = between(13.5, 0.0, 1000.0)
+    offset: float = between(6.4, -100.0, 100.0)
+    crowding: float = between(0.1, 0.0, 10.0)
 
 
 @dataclass(frozen=True)
@@ -108,10 +155,17 @@ class ShortlistConfig:
 
 @dataclass(frozen=True)
 class RetrievalConfig:
-    """P(c|R) by appearance."""
+    """P(c|R) by appearance. likeness : what decides which objects are aligned; fusion : P(c|R) with
+    the alignment scores."""
 
     observed: ObservedAppearanceConfig = field(default_factory=ObservedAppearanceConfig)
     illuminants: IlluminantsConfig = field(default_factory=IlluminantsConfig)
     similarity: SimilarityConfig = field(default_factory=SimilarityConfig)
+    likeness: FusionConfig = field(
+        default_factory=lambda: FusionConfig(
+            colour=24.26, pairs=25.27, size=0.44, alignment=0.0, offset=9.88, crowding=1.0
+        )
+    )
     fusion: FusionConfig = field(default_factory=FusionConfig)
+    alignment: AlignmentConfig = field(default_factory=AlignmentConfig)
     shortlist: ShortlistConfig = field(default_factory=ShortlistConfig)

@@ -9,7 +9,7 @@ from brrp_cli.config import FeatureConfig, RegistrationConfig, SearchConfig
 from brrp_cli.geometry import normalise, similarity, transform_points
 from brrp_cli.observation.support_plane import Plane, plane_frame
 from brrp_cli.registration.batched_ransac import ransac_motions
-from brrp_cli.registration.model import Model
+from brrp_cli.registration.model import Model, ModelGeometry
 from brrp_cli.registration.ransac import match_pairs
 from brrp_cli.registration.scale_scan import ObservedCloud
 from brrp_cli.seeds import child_rng
@@ -18,7 +18,7 @@ Array = NDArray[np.float64]
 
 
 def resting_initial_poses(
-    model: Model, points: Array, plane: Plane, config: SearchConfig
+    model: ModelGeometry, points: Array, plane: Plane, config: SearchConfig
 ) -> list[Array]:
     """T_cam_model (4, 4) of the model in each resting pose, turned about the plane's normal.
 
@@ -55,7 +55,7 @@ def resting_initial_poses(
 
 
 def _laid_over(
-    T_plane_model: Array, model: Model, middle: Array, camera: Array, config: SearchConfig
+    T_plane_model: Array, model: ModelGeometry, middle: Array, camera: Array, config: SearchConfig
 ) -> NDArray[np.bool_]:
     """Move transforms (B, 4, 4), in place, so that the box of the side that faces the camera (3,)
     lies over `middle` (2,); returns which points (B, m) count as that side.
@@ -79,7 +79,7 @@ def _lay_over(
     T_plane_model: Array,
     counted: NDArray[np.bool_],
     middle: Array,
-    model: Model,
+    model: ModelGeometry,
     config: SearchConfig,
 ) -> None:
     """Move transforms (B, 4, 4), in place, so that the box of the points that count (B, m) lies
@@ -93,7 +93,7 @@ def _reach(
     T_plane_model: Array,
     directions: Array,
     counted: NDArray[np.bool_],
-    model: Model,
+    model: ModelGeometry,
     config: SearchConfig,
 ) -> tuple[Array, Array]:
     """How far, least and most (B,), the model's points that count (B, m) reach in directions
@@ -136,7 +136,7 @@ def feature_matched_poses(
     return starts
 
 
-def _longest(T_plane_model: Array, model: Model, config: SearchConfig) -> Array:
+def _longest(T_plane_model: Array, model: ModelGeometry, config: SearchConfig) -> Array:
     """Unit direction (2,) along the plane in which the model reaches furthest."""
     points = transform_points(T_plane_model, model.surface[: config.model_points])
     footprint = np.asarray(points, dtype=np.float64)[:, :2]

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from brrp_cli.registration.model import Model
+from brrp_cli.registration.model import ModelGeometry
 
 Array = NDArray[np.float64]
 
@@ -24,7 +24,7 @@ MOST_RESIZED = 0.1
 def refine_to_sdf(
     T_model_cam: Array,
     observed: Array,
-    model: Model,
+    model: ModelGeometry,
     distance: float,
     iterations: int,
     *,
@@ -51,7 +51,9 @@ def refine_to_sdf(
     return T
 
 
-def _step(points: NDArray[np.float32], model: Model, distance: float, resize: bool) -> Array:
+def _step(
+    points: NDArray[np.float32], model: ModelGeometry, distance: float, resize: bool
+) -> Array:
     """Turn, shift and change of log size (B, 7), about the model's middle, of points (3, B, n)."""
     _, batch, count = points.shape
     p = points.reshape(3, -1)

@@ -11,7 +11,7 @@ from brrp_cli.config import VerificationConfig
 from brrp_cli.frames.frame import Frame
 from brrp_cli.frames.projection import depth_behind
 from brrp_cli.observation.support_plane import Plane
-from brrp_cli.registration.model import Model
+from brrp_cli.registration.model import ModelGeometry
 
 Array = NDArray[np.float64]
 
@@ -28,7 +28,7 @@ class Verifier:
     def score(
         self,
         T_cam_model: Array,
-        model: Model,
+        model: ModelGeometry,
         config: VerificationConfig,
         *,
         model_points: int,
@@ -48,7 +48,7 @@ class Verifier:
         )
 
     def _explained(
-        self, T_cam_model: Array, model: Model, seen: Array, config: VerificationConfig
+        self, T_cam_model: Array, model: ModelGeometry, seen: Array, config: VerificationConfig
     ) -> Array:
         """Mean (B,) of a Gaussian of the observed points' distances, less a share of how far the
         others are, so that a search that explains nothing yet still has a slope."""

@@ -2,21 +2,27 @@
 
 Stored objects were looked at from all around when the prior was built. What is seen of an object is
 compared with every stored view in many lights, and with the stored object's size in its resting
-poses. Probabilities need not sum to 1: the rest is the probability that the prior does not hold the
-object. The numbers are in brrp_cli/config/retrieval.py.
+poses. The objects that are most alike are then laid over what is seen. Probabilities need not sum
+to 1: the rest is the probability that the prior does not hold the object. The numbers are in
+brrp_cli/config/retrieval.py.
 """
 
 from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from brrp_cli.config import Config
+from brrp_cli.config.retrieval import FusionConfig
 from brrp_cli.errors import RetrievalError
 from brrp_cli.frames.frame import BACKGROUND, Frame
 from brrp_cli.observation.ray_samples import box_center
 from brrp_cli.observation.support_plane import Plane, fit_plane
 from brrp_cli.prior.store import Prior
+from brrp_cli.retrieval.aligned import Aligner
 from brrp_cli.retrieval.illuminants import lights, local_lights, log_prior
 from brrp_cli.retrieval.observed_appearance import see_object
 from brrp_cli.retrieval.score_fusion import Similarity, believe
@@ -42,6 +48,8 @@ class AppearanceRetriever:
         self._gains = lights(own.illuminants)
         self._light = log_prior(self._gains, own.illuminants)
         self._local = local_lights(self._gains, own.illuminants)
+        self._names = prior.names
+        self._aligner = Aligner(prior, own.alignment)
         self._frame: Frame | None = None
         self._answers: dict[int, NDArray[np.float64]] = {}
 
@@ -49,13 +57,7 @@ class AppearanceRetriever:
         """P(c|R) (n,) for one object of the frame, in the order of the prior's names; sum <= 1."""
         if frame is not self._frame:
             found = self.evidence(frame)
-            answers = believe(
-                list(found.values()),
-                self._light,
-                self._local,
-                len(self._looks),
-                self._config.retrieval.fusion,
-            )
+            answers = self._believe(list(found.values()), self._config.retrieval.fusion)
             self._answers = dict(zip(found, answers, strict=True))
             self._frame = frame
         if object_id not in self._answers:
@@ -70,16 +72,60 @@ class AppearanceRetriever:
     def evidence(self, frame: Frame) -> dict[int, Similarity]:
         """How alike every object of the frame is to the stored ones, by id."""
         plane, own = self.plane(frame), self._config.retrieval
-        found = {}
+        looks, points = {}, {}
         for object_id in frame.object_ids:
             seen = see_object(frame, object_id, plane, own.observed)
             histograms = lit_histograms(seen, self._gains)
             rows = self._shortlist.rows(seen, histograms)
             stored = self._looks.rows(rows)
-            found[object_id] = similarity(
+            looks[object_id] = similarity(
                 seen, histograms, stored, rows, len(self._gains), own.similarity
             )
-        return found
+            points[object_id] = seen.points
+        if plane is None:
+            return {i: replace(look, alignment=own.alignment.neutral) for i, look in looks.items()}
+        likely = self._believe(list(looks.values()), own.likeness)
+        return {
+            i: self._aligned(look, probabilities[look.rows], points[i], frame, plane)
+            for (i, look), probabilities in zip(looks.items(), likely, strict=True)
+        }
+
+    def _aligned(
+        self,
+        look: Similarity,
+        likely: NDArray[np.float64],
+        points: NDArray[np.float64],
+        frame: Frame,
+        plane: Plane,
+    ) -> Similarity:
+        """With the alignment scores of the objects that are `likely` (m,) by their looks."""
+        own = self._config.retrieval.alignment
+        if len(points) < own.least_points:
+            return replace(look, alignment=own.neutral)
+        order = np.argsort(-likely, kind="stable")
+        order = order[likely[order] > likely[order[0]] * np.exp(-own.margin)]
+        shuffled = points[np.random.default_rng(self._seed).permutation(len(points))]
+        alignment = np.full(len(look.rows), own.unaligned, np.float32)
+        for chosen in (order[: own.most], order[own.most : own.most + own.more]):
+            # In the prior's order, in which shards hold them.
+            chosen = np.sort(chosen)
+            names = [self._names[row] for row in look.rows[chosen]]
+            found = self._aligner.scores(shuffled, frame, plane, names)
+            alignment[chosen] = np.maximum(found, own.lowest)
+            if found.max(initial=0.0) >= own.enough:
+                break
+        return replace(look, alignment=alignment)
+
+    def _believe(
+        self, evidence: Sequence[Similarity], weights: FusionConfig
+    ) -> list[NDArray[np.float64]]:
+        return believe(
+            evidence,
+            self._light,
+            self._local,
+            len(self._looks),
+            weights,
+        )
 
     def plane(self, frame: Frame) -> Plane | None:
         """The support plane of the frame; None where none is found."""

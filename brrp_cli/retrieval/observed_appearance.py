@@ -23,6 +23,7 @@ class SeenObject:
     colours : (k, 3) RGB 0 to 255 and shares : (k,); None where the frame has no colours
     pairs : (PAIR_BINS,), see descriptors/point_pairs.py; None where there are too few points
     size : (3,) metres, height above the plane and footprint; None without plane or points
+    points : (n, 3) metres, camera frame, without the plane's
     hidden : share of the silhouette that ends at something in front of it or at the image's edge
     """
 
@@ -30,6 +31,7 @@ class SeenObject:
     shares: NDArray[np.float64] | None
     pairs: NDArray[np.float32] | None
     size: NDArray[np.float64] | None
+    points: NDArray[np.float64]
     hidden: float
 
 
@@ -46,7 +48,7 @@ def see_object(
         colours, shares = palette(frame.rgb[_inner(solid if solid.any() else mask, config.inner)])
     pairs = _pairs(points, config)
     size = None if plane is None or pairs is None else _size(points, plane, config)
-    return SeenObject(colours, shares, pairs, size, _hidden(frame, mask, config))
+    return SeenObject(colours, shares, pairs, size, points, _hidden(frame, mask, config))
 
 
 def _without_plane(

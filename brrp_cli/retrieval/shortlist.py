@@ -24,7 +24,7 @@ class Shortlist:
 
     def rows(self, seen: SeenObject, histograms: NDArray[np.floating] | None) -> NDArray[np.int64]:
         """Rows (m,) of the table that are to be looked at, ascending."""
-        own, weights = self._config.shortlist, self._config.fusion
+        own, weights = self._config.shortlist, self._config.likeness
         neutral = self._config.similarity.neutral_colour
         if len(self._all) <= own.closely:
             return self._all

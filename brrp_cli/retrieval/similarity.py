@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brrp_cli.config.retrieval import SimilarityConfig
-from brrp_cli.descriptors.colour_histogram import colour_histograms
+from brrp_cli.descriptors.colour_histogram import AB_BINS, colour_histograms
 from brrp_cli.descriptors.descriptor import roots
 from brrp_cli.retrieval.observed_appearance import SeenObject
 from brrp_cli.retrieval.score_fusion import Similarity
@@ -25,11 +25,23 @@ def colour_likeness(
     count, views, bins = stored.shape
     if histograms is None:
         return np.full((lights, count), config.neutral_colour, np.float32)
-    seen = np.sqrt(histograms, dtype=np.float32)
-    alike = seen @ roots(stored.reshape(count * views, bins)).T
+    seen = np.sqrt(blurred(histograms, config.blur))
+    known = np.square(roots(stored.reshape(count * views, bins)))
+    alike = seen @ np.sqrt(blurred(known, config.blur)).T
     found = np.asarray(alike.reshape(len(seen), count, views).max(axis=-1))
     found[:, ~stored.any(axis=(1, 2))] = config.neutral_colour
     return found
+
+
+def blurred(histograms: NDArray[np.floating], share: float) -> NDArray[np.float32]:
+    """Histograms (n, COLOUR_BINS) of which each bin has given `share` to either of its neighbours
+    along a* and b*; what would leave the histogram stays."""
+    kernel = np.diag(np.full(AB_BINS - 1, share, np.float32), 1)
+    kernel = kernel + kernel.T
+    kernel += np.diag(1 - kernel.sum(axis=0))
+    both = np.kron(kernel, kernel).astype(np.float32)
+    plain = histograms.astype(np.float32, copy=False).reshape(-1, AB_BINS**2)
+    return np.asarray((plain @ both).reshape(histograms.shape))
 
 
 def pair_likeness(
@@ -64,7 +76,8 @@ def size_penalty(
     weight = np.array(config.smaller, dtype=np.float32)
     smaller = np.minimum(np.maximum(-off, 0) ** 2 * weight, limit)
     against = (larger + np.float32((1 - hidden) ** 2) * smaller).sum(axis=-1)
-    return np.asarray(-np.nanmin(against, axis=-1) / 2, dtype=np.float32)
+    least = np.minimum(np.nanmin(against, axis=-1) / 2, np.float32(config.size_most))
+    return np.asarray(-least, dtype=np.float32)
 
 
 def similarity(

@@ -9,6 +9,8 @@ from brrp_cli.errors import RetrievalError
 from brrp_cli.prior.build.build import build_prior
 from brrp_cli.prior.parameters import BuildParameters
 from brrp_cli.prior.store import open_prior
+from brrp_cli.registration.model import search_model
+from brrp_cli.retrieval.aligned import PARTS, bare_model
 from brrp_cli.retrieval.appearance import AppearanceRetriever
 from brrp_cli.retrieval.base import unknown
 
@@ -70,6 +72,51 @@ def test_without_colours_shape_and_size_are_left(prior, retriever):
             assert set(ranked[:2]) == {"red_box", "blue_box"}
         else:
             assert ranked[0] == name
+
+
+def test_what_is_seen_lies_on_the_true_object_alone(prior, retriever):
+    frame, names = scene()
+    for object_id, look in retriever.evidence(frame).items():
+        score = dict(zip([prior.names[row] for row in look.rows], look.alignment, strict=True))
+        if object_id == STRANGER:
+            assert max(score.values()) < 0.7
+            continue
+        name = names[object_id]
+        same = {"red_box", "blue_box"} if name.endswith("_box") else {name}
+        assert score[name] > 0.85
+        assert max(v for other, v in score.items() if other not in same) < score[name] - 0.15
+
+
+def test_colours_that_say_nothing_leave_it_to_alignment(prior, retriever):
+    """Half of a box is hidden: its size is too small, and it still lies on the stored box."""
+    frame, names = scene()
+    segmap = frame.segmap.copy()
+    rows, columns = np.nonzero(segmap == 3)
+    cut = columns > np.median(columns)
+    segmap[rows[cut], columns[cut]] = 0
+    grey = dataclasses.replace(frame, segmap=segmap, rgb=np.full_like(frame.rgb, 127))
+    probabilities = retriever.probabilities(grey, 3)
+    best = [prior.names[k] for k in np.argsort(-probabilities)[:2]]
+    assert set(best) == {"red_box", "blue_box"} and names[3] in best
+
+
+def test_without_a_plane_nothing_is_aligned(retriever):
+    frame, _ = scene()
+    floating = np.where((frame.segmap == 0)[..., None], np.nan, frame.points)
+    bare = dataclasses.replace(frame, points=floating.astype(np.float32))
+    neutral = preset("default").retrieval.alignment.neutral
+    assert retriever.plane(bare) is None
+    assert all(np.all(look.alignment == neutral) for look in retriever.evidence(bare).values())
+
+
+def test_a_model_that_is_read_alone_is_that_of_the_object(prior):
+    ((_, arrays),) = prior.parts(["red_can"], PARTS)
+    whole, alone = search_model(prior.load("red_can")), bare_model(arrays, 150)
+    points = np.random.default_rng(0).uniform(-0.2, 0.2, (50, 3))
+    np.testing.assert_allclose(alone.signed_distance(points), whole.signed_distance(points))
+    np.testing.assert_array_equal(alone.resting, whole.resting)
+    np.testing.assert_array_equal(alone.surface, whole.surface[:150])
+    np.testing.assert_array_equal(alone.normals, whole.normals[:150])
 
 
 def test_answers_are_those_of_the_frame_that_is_asked_about(prior, retriever):

@@ -114,7 +114,8 @@ def test_both_uses_the_fetched_folder_and_the_kept_embeddings(
     frame = replace(coloured_frame, points=wall)
     appearance = choose_retriever("appearance", prior, CONFIG, 0)
     before = appearance.probabilities(frame, 7)
-    assert np.allclose(before, before[0])
+    # They are the same box, each with other points on its surface.
+    np.testing.assert_allclose(before, before[0], rtol=0.1)
     found = choose_retriever("both", prior, CONFIG, 0).probabilities(frame, 7)
     assert prior.names[int(np.argmax(found))] == "red_box"
     assert np.isclose(found.sum(), before.sum())

@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -6,7 +8,7 @@ from brrp_cli.retrieval.base import unknown
 from brrp_cli.retrieval.illuminants import lights, local_lights, log_prior
 from brrp_cli.retrieval.score_fusion import Similarity, believe
 
-WEIGHTS = FusionConfig(colour=20.0, pairs=20.0, size=0.5, offset=8.0)
+WEIGHTS = FusionConfig(colour=20.0, pairs=20.0, size=0.5, offset=8.0, crowding=1.0)
 FLAT, SAME = np.zeros(2), np.eye(2)
 
 
@@ -45,6 +47,18 @@ def test_the_formula_in_plain_numbers():
     found = believe([item], np.zeros(1), np.eye(1), 2, WEIGHTS)[0]
     odds = np.exp([8 - 2 - 1.5, 8 - 2.0]) / 2
     np.testing.assert_allclose(found, odds / (1 + odds.sum()), rtol=1e-5)
+
+
+def test_alignment_counts_for_each_object():
+    # Log odds 8 - 10 * 0.1 - ln 2 and 8 - 10 * 0.6 - ln 2.
+    item = replace(seen([[1.0, 1.0]]), alignment=np.array([0.9, 0.4], np.float32))
+    weights = replace(WEIGHTS, alignment=10.0)
+    found = believe([item], np.zeros(1), np.eye(1), 2, weights)[0]
+    odds = np.exp([7.0, 2.0]) / 2
+    np.testing.assert_allclose(found, odds / (1 + odds.sum()), rtol=1e-5)
+    half = believe([item], np.zeros(1), np.eye(1), 2, replace(weights, crowding=0.5))[0]
+    odds *= np.sqrt(2)
+    np.testing.assert_allclose(half, odds / (1 + odds.sum()), rtol=1e-5)
 
 
 def test_objects_that_were_not_looked_at_have_no_probability():

@@ -1,14 +1,26 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from brrp_cli.config.retrieval import RetrievalConfig, SimilarityConfig
-from brrp_cli.descriptors.colour_histogram import COLOUR_BINS
+from brrp_cli.descriptors.colour_histogram import (
+    AB_BINS,
+    COLOUR_BINS,
+    L_BINS,
+    colour_histograms,
+)
 from brrp_cli.descriptors.descriptor import to_bytes
 from brrp_cli.descriptors.point_pairs import PAIR_BINS
 from brrp_cli.prior.appearance_index import first_look
 from brrp_cli.retrieval.observed_appearance import SeenObject
 from brrp_cli.retrieval.shortlist import Shortlist
-from brrp_cli.retrieval.similarity import colour_likeness, pair_likeness, size_penalty
+from brrp_cli.retrieval.similarity import (
+    blurred,
+    colour_likeness,
+    pair_likeness,
+    size_penalty,
+)
 
 LIKE = SimilarityConfig()
 POSES = np.array([[[0.2, 0.1, 0.05], [0.05, 0.2, 0.1]]], np.float32)
@@ -40,10 +52,33 @@ def test_missing_poses_and_sizes_say_nothing():
     assert size_penalty(None, POSES, 0, LIKE).tolist() == [0]
 
 
+def test_blur_shares_a_colour_with_its_neighbours_in_hue_and_chroma():
+    grid = np.zeros((L_BINS, AB_BINS, AB_BINS), np.float32)
+    grid[1, 3, 3], grid[2, 0, 6] = 0.6, 0.4
+    found = blurred(grid.reshape(1, -1), 0.2).reshape(grid.shape)
+    np.testing.assert_allclose(found.sum(axis=(1, 2)), grid.sum(axis=(1, 2)), atol=1e-6)
+    across = np.array([0.2, 0.6, 0.2])
+    np.testing.assert_allclose(found[1, 2:5, 2:5], 0.6 * np.outer(across, across), atol=1e-6)
+    # What would leave the histogram stays at its edge.
+    np.testing.assert_allclose(found[2, :2, 5:], 0.4 * np.outer([0.8, 0.2], [0.2, 0.8]), atol=1e-6)
+    np.testing.assert_array_equal(blurred(grid.reshape(1, -1), 0.0), grid.reshape(1, -1))
+
+
+def test_a_plain_colour_in_light_that_was_not_tried_is_still_alike():
+    # Grey in light that is off by half a step of the illuminants: 0.84 without blur.
+    grey, ones = np.full((1, 3), 128.0), np.ones((1, 3))
+    stored = to_bytes(colour_histograms(grey, np.ones(1), ones))[:, None]
+    off = colour_histograms(grey, np.ones(1), np.array([[1.026, 0.985, 0.974]]))
+    sharp = colour_likeness(off, stored, 1, replace(LIKE, blur=0.0))
+    assert sharp < 0.9 and colour_likeness(off, stored, 1, LIKE) > 0.95
+    red = colour_histograms(np.array([[190.0, 40, 35]]), np.ones(1), ones)
+    assert colour_likeness(red, stored, 1, LIKE) < 0.3
+
+
 def test_the_best_view_counts():
     rng = np.random.default_rng(0)
     views = rng.dirichlet(np.full(COLOUR_BINS, 0.05), (3, 4))
-    found = colour_likeness(views[:, 2], to_bytes(views), 3, LIKE)
+    found = colour_likeness(views[:, 2], to_bytes(views), 3, replace(LIKE, blur=0.0))
     np.testing.assert_allclose(np.diag(found), 1, atol=0.02)
     expected = np.einsum("gb,mvb->gmv", np.sqrt(views[:, 2]), np.sqrt(views)).max(axis=-1)
     np.testing.assert_allclose(found, expected, atol=0.02)
@@ -52,7 +87,7 @@ def test_the_best_view_counts():
 def test_objects_without_colours_are_neither_preferred_nor_refused():
     stored = np.zeros((2, 3, COLOUR_BINS), np.uint8)
     stored[1, :, 5] = 255
-    seen = np.eye(COLOUR_BINS)[[5, 6]]
+    seen = np.eye(COLOUR_BINS)[[5, 150]]
     np.testing.assert_allclose(
         colour_likeness(seen, stored, 2, LIKE), [[LIKE.neutral_colour, 1], [LIKE.neutral_colour, 0]]
     )
@@ -78,7 +113,9 @@ def test_a_shortlist_of_a_large_prior_holds_the_true_object():
     shortlist = Shortlist(first_look(table), RetrievalConfig())
     for true in (7, 1234, 2999):
         size = table["sizes"][true, 0].astype(float)
-        seen = SeenObject(None, None, pairs[true, 0].astype(np.float32), size, 0.0)
+        seen = SeenObject(
+            None, None, pairs[true, 0].astype(np.float32), size, np.zeros((0, 3)), 0.0
+        )
         histograms = np.repeat(colour[true], 9, axis=0).astype(np.float32)
         rows = shortlist.rows(seen, histograms)
         assert (

@@ -1,0 +1,133 @@
+"""How well each of many models can be placed on what is seen: the search of pose_search.py, cut
+short.
+
+The search looks for the pose to within a millimetre. Here only the alignment score is asked for,
+which tells models apart long before that.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import permutations, product
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brrp_cli.config import SearchConfig
+from brrp_cli.observation.support_plane import Plane
+from brrp_cli.registration.initial_poses import resting_initial_poses
+from brrp_cli.registration.model import ModelGeometry
+from brrp_cli.registration.sdf_refinement import refine_to_sdf
+from brrp_cli.registration.verification import Verifier
+
+Array = NDArray[np.float64]
+
+
+def alignment_scores(
+    models: Sequence[ModelGeometry], verifier: Verifier, config: SearchConfig
+) -> Array:
+    """The alignment score (m,) that each model reaches, 1 at best, on a plane that `verifier` must
+    have.
+
+    All are refined coarsely; those that stay `beaten` behind the best of them are not refined
+    further. Scores are compared with `seen_points` observed points, at last with `fine_points`.
+    """
+    rough = [_coarse(model, verifier, config) for model in models]
+    score = np.array([reached for _, reached in rough])
+    for i in np.flatnonzero(score >= score.max(initial=-np.inf) - config.beaten).tolist():
+        T = _refined(
+            rough[i][0],
+            models[i],
+            verifier,
+            config.fine_points,
+            config.fine_distance,
+            config.fine_steps,
+        )
+        score[i] = _scores(T, models[i], verifier, config, config.fine_points).max()
+    return score
+
+
+def _coarse(model: ModelGeometry, verifier: Verifier, config: SearchConfig) -> tuple[Array, float]:
+    """The `fine` best placements T_cam_model (B, 4, 4) after a coarse refinement, and the best
+    score."""
+    assert verifier.plane is not None
+    resting = np.stack(resting_initial_poses(model, verifier.points, verifier.plane, config))
+    T = np.concatenate(
+        [
+            resting,
+            raised_poses(resting, model, verifier.points, verifier.plane, config),
+            principal_poses(model, verifier.points),
+        ]
+    )
+    first = _scores(T, model, verifier, config, config.seen_points // config.first_share)
+    T = T[np.argsort(-first, kind="stable")[: config.coarse]]
+    T = _refined(
+        T, model, verifier, config.coarse_points, config.coarse_distance, config.coarse_steps
+    )
+    score = _scores(T, model, verifier, config, config.seen_points)
+    order = np.argsort(-score, kind="stable")[: config.fine]
+    return np.asarray(T[order]), float(score[order[0]])
+
+
+def raised_poses(
+    resting: Array, model: ModelGeometry, seen: Array, plane: Plane, config: SearchConfig
+) -> Array:
+    """Those of the resting poses T_cam_model (B, 4, 4) whose top is lower than that of the seen
+    points (n, 3) by more than `hidden`, raised to it: an object that lies on others."""
+    top = np.quantile(plane.signed_distance(seen), 1 - config.stray)
+    placed = resting[:, :3, :3] @ model.surface.T + resting[:, :3, 3:]
+    missing = top - (plane.signed_distance(placed.swapaxes(1, 2).reshape(-1, 3))).reshape(
+        len(resting), -1
+    ).max(axis=1)
+    raised = resting.copy()
+    raised[:, :3, 3] += missing[:, None] * plane.normal
+    return raised[missing > config.hidden]
+
+
+def principal_poses(model: ModelGeometry, seen: Array) -> Array:
+    """T_cam_model (24, 4, 4) that lay the model's principal axes along those of seen points (n, 3),
+    in every order and sense, middle on middle: an object that leans on others."""
+    middle, own = seen.mean(axis=0), model.surface.mean(axis=0)
+    axes = np.linalg.svd(seen - middle, full_matrices=False)[2]
+    own_axes = np.linalg.svd(model.surface - own, full_matrices=False)[2]
+    # Right-handed, both: what turns one into the other is no mirror.
+    axes[2] *= np.linalg.det(axes)
+    own_axes[2] *= np.linalg.det(own_axes)
+    T = np.tile(np.eye(4), (len(_CUBE), 1, 1))
+    T[:, :3, :3] = axes.T @ _CUBE @ own_axes
+    T[:, :3, 3] = middle - T[:, :3, :3] @ own
+    return T
+
+
+def _rotations_of_a_cube() -> Array:
+    """(24, 3, 3)."""
+    signed = [
+        np.eye(3)[list(order)] * np.array(signs)[:, None]
+        for order in permutations(range(3))
+        for signs in product((1, -1), repeat=3)
+    ]
+    return np.stack([matrix for matrix in signed if np.linalg.det(matrix) > 0])
+
+
+_CUBE = _rotations_of_a_cube()
+
+
+def _scores(
+    T_cam_model: Array, model: ModelGeometry, verifier: Verifier, config: SearchConfig, points: int
+) -> Array:
+    return verifier.score(
+        T_cam_model, model, config.alignment_score, model_points=points, seen_points=points
+    )
+
+
+def _refined(
+    T_cam_model: Array,
+    model: ModelGeometry,
+    verifier: Verifier,
+    points: int,
+    distance: float,
+    steps: int,
+) -> Array:
+    T_model_cam = np.asarray(np.linalg.inv(T_cam_model), dtype=np.float64)
+    seen = verifier.points[:points]
+    return np.asarray(np.linalg.inv(refine_to_sdf(T_model_cam, seen, model, distance, steps)))

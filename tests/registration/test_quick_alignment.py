@@ -1,0 +1,75 @@
+"""Alignment scores of many models at once, and the poses that resting ones do not reach."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+from table_scene import T_CAM_WORLD, TABLE, box, ell, in_camera, photograph, placed, stored
+
+from brrp_cli.config.retrieval import AlignmentConfig
+from brrp_cli.geometry import similarity, transform_points
+from brrp_cli.registration.initial_poses import resting_initial_poses
+from brrp_cli.registration.model import search_model
+from brrp_cli.registration.quick_alignment import (
+    alignment_scores,
+    principal_poses,
+    raised_poses,
+)
+from brrp_cli.registration.verification import Verifier
+
+CONFIG = AlignmentConfig().search
+THING = 5
+
+
+@pytest.fixture(scope="module")
+def models():
+    return [search_model(stored(name)) for name in ("box", "ell")]
+
+
+def seen(mesh, T_cam_mesh):
+    """What a frame says of a mesh there."""
+    frame = photograph({THING: in_camera(mesh, T_cam_mesh)})
+    points = frame.object_points(THING).astype(np.float64)
+    return Verifier(np.random.default_rng(0).permutation(points), frame, TABLE)
+
+
+def test_the_true_model_scores_highest(models):
+    where = placed(0.05, -0.04, 0.3)
+    for true, mesh in enumerate((box(), ell())):
+        score = alignment_scores(models, seen(mesh, where), CONFIG)
+        assert score[true] > 0.9 and score[1 - true] < score[true] - 0.1
+
+
+def test_an_object_that_leans_or_lies_on_others_is_aligned_too(models):
+    """It stands in none of its resting poses on the table."""
+    leaning = similarity(translation=np.array([0.05, -0.04, 0.06]))
+    leaning[:3, :3] = Rotation.from_euler("xyz", [35, 20, 60], degrees=True).as_matrix()
+    raised = similarity(translation=np.array([0.05, -0.04, 0.09]))
+    for T_world_mesh in (leaning, raised):
+        where = T_CAM_WORLD @ T_world_mesh
+        score = alignment_scores(models, seen(box(), where), CONFIG)
+        assert score[0] > 0.85 and score[1] < score[0] - 0.2
+
+
+def test_principal_axes_give_the_pose_of_a_whole_surface(models):
+    model = models[0]
+    T_cam_model = np.eye(4)
+    T_cam_model[:3, :3] = Rotation.from_euler("xyz", [0.4, -1.1, 2.0]).as_matrix()
+    T_cam_model[:3, 3] = 0.1, -0.2, 0.8
+    found = principal_poses(model, transform_points(T_cam_model, model.surface))
+    assert found.shape == (24, 4, 4)
+    np.testing.assert_allclose(np.linalg.det(found[:, :3, :3]), 1)
+    assert np.abs(found - T_cam_model).max(axis=(1, 2)).min() < 1e-6
+
+
+def test_raised_poses_reach_the_top_of_what_is_seen(models):
+    where = T_CAM_WORLD @ similarity(translation=np.array([0.05, -0.04, 0.09]))
+    verifier = seen(box(), where)
+    resting = np.stack(resting_initial_poses(models[0], verifier.points, TABLE, CONFIG))
+    raised = raised_poses(resting, models[0], verifier.points, TABLE, CONFIG)
+    assert len(raised)
+    top = np.quantile(TABLE.signed_distance(verifier.points), 1 - CONFIG.stray)
+    for T in raised:
+        height = TABLE.signed_distance(transform_points(T, models[0].surface)).max()
+        assert height == pytest.approx(top, abs=1e-9)
