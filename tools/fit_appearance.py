@@ -65,14 +65,15 @@ def main(priors: tuple[Path, ...], absent: bool, report: bool, sets: tuple[Path,
     try:
         for path in priors:
             prior = open_prior(path)
-            seen = [view for folder in sets for view in look(prior, folder)]
+            seen = [view for folder in sets for view in look(prior, folder, report)]
             views += seen + ([left_out(view) for view in seen] if absent else [])
     except BrrpError as error:
         raise click.ClickException(str(error)) from error
-    weights = FusionConfig() if report else fit(views)
-    click.echo(f"{weights}, mean loss {loss(views, weights):.4f}")
+    fitted = None if report else fit(views)
     for count in sorted({view.count for view in views}):
         members = [view for view in views if view.count == count]
+        weights = fitted or weights_of(count)
+        click.echo(f"{count} objects: {weights}, mean loss {loss(members, weights):.4f}")
         click.echo(f"{count} objects: calibration error {calibration(members, weights):.3f}")
         for group in dict.fromkeys(view.group for view in members):
             for large in (True, False):
@@ -80,9 +81,20 @@ def main(priors: tuple[Path, ...], absent: bool, report: bool, sets: tuple[Path,
                 click.echo(f"{count}, {line(group, here, weights, large)}")
 
 
-def look(prior: Prior, folder: Path) -> list[View]:
-    """The evidence of all views of all scenes in a folder."""
-    retriever = AppearanceRetriever(prior, preset("default"), 0)
+def weights_of(count: int) -> FusionConfig:
+    """The constants in the code for a prior of that size."""
+    own = preset("default").retrieval
+    return own.fusion if count >= own.alignment.from_objects else own.likeness
+
+
+def look(prior: Prior, folder: Path, as_used: bool) -> list[View]:
+    """The evidence of all views of all scenes in a folder; with alignment for a prior of any size,
+    or `as_used`."""
+    config = preset("default")
+    if not as_used:
+        alignment = replace(config.retrieval.alignment, from_objects=1)
+        config = replace(config, retrieval=replace(config.retrieval, alignment=alignment))
+    retriever = AppearanceRetriever(prior, config, 0)
     views = []
     for scene in progress(find_scenes(folder), folder.name):
         for index in range(len(scene.views)):

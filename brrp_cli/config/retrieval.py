@@ -70,6 +70,7 @@ class SimilarityConfig:
         seen from one side; size_limit : squared spreads beyond which nothing more speaks against
         it; size_most : what speaks against all three at most, since an object that leans on
         others, or lies on them, stands in no resting pose on the plane
+    `blur` and `size_most` are those of priors whose objects are aligned too
     """
 
     neutral_colour: float = share(0.93)
@@ -86,6 +87,8 @@ class SimilarityConfig:
 class AlignmentConfig:
     """Stored objects are laid over what is seen, which tells what colours and sizes cannot.
 
+    from_objects : size of the prior from which on they are. Fewer objects are told apart without
+        it, `likeness` in place of `fusion`, and real depth lowers the scores of the right one too
     most : objects that are, the most probable by their likenesses; where none of them reaches the
         score `enough`, so are the next `more`: what leans on others, or is hidden in part, is less
         alike; margin : nats by which theirs may be less than the best one's; least_points : of the
@@ -96,6 +99,7 @@ class AlignmentConfig:
     search : how they are placed (registration/quick_alignment.py)
     """
 
+    from_objects: int = 100
     most: int = 30
     enough: float = share(0.8)
     more: int = 40
@@ -155,8 +159,8 @@ class ShortlistConfig:
 
 @dataclass(frozen=True)
 class RetrievalConfig:
-    """P(c|R) by appearance. likeness : what decides which objects are aligned; fusion : P(c|R) with
-    the alignment scores."""
+    """P(c|R) by appearance. likeness : P(c|R) of small priors, and of large ones what decides which
+    objects are aligned; fusion : P(c|R) with the alignment scores."""
 
     observed: ObservedAppearanceConfig = field(default_factory=ObservedAppearanceConfig)
     illuminants: IlluminantsConfig = field(default_factory=IlluminantsConfig)

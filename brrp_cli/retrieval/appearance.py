@@ -50,6 +50,10 @@ class AppearanceRetriever:
         self._local = local_lights(self._gains, own.illuminants)
         self._names = prior.names
         self._aligner = Aligner(prior, own.alignment)
+        self._aligns = len(prior.names) >= own.alignment.from_objects
+        self._similarity = own.similarity
+        if not self._aligns:
+            self._similarity = replace(own.similarity, blur=0.0, size_most=np.inf)
         self._frame: Frame | None = None
         self._answers: dict[int, NDArray[np.float64]] = {}
 
@@ -57,7 +61,9 @@ class AppearanceRetriever:
         """P(c|R) (n,) for one object of the frame, in the order of the prior's names; sum <= 1."""
         if frame is not self._frame:
             found = self.evidence(frame)
-            answers = self._believe(list(found.values()), self._config.retrieval.fusion)
+            own = self._config.retrieval
+            weights = own.fusion if self._aligns else own.likeness
+            answers = self._believe(list(found.values()), weights)
             self._answers = dict(zip(found, answers, strict=True))
             self._frame = frame
         if object_id not in self._answers:
@@ -79,9 +85,11 @@ class AppearanceRetriever:
             rows = self._shortlist.rows(seen, histograms)
             stored = self._looks.rows(rows)
             looks[object_id] = similarity(
-                seen, histograms, stored, rows, len(self._gains), own.similarity
+                seen, histograms, stored, rows, len(self._gains), self._similarity
             )
             points[object_id] = seen.points
+        if not self._aligns:
+            return looks
         if plane is None:
             return {i: replace(look, alignment=own.alignment.neutral) for i, look in looks.items()}
         likely = self._believe(list(looks.values()), own.likeness)

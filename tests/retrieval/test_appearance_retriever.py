@@ -31,9 +31,24 @@ def prior(tmp_path_factory):
     return open_prior(folder / "prior")
 
 
+@pytest.fixture(params=["aligned", "by looks alone"])
+def retriever(prior, request):
+    return retriever_of(prior, request.param == "aligned")
+
+
 @pytest.fixture
-def retriever(prior):
-    return AppearanceRetriever(prior, preset("default"), 0)
+def aligner(prior):
+    return retriever_of(prior, True)
+
+
+def retriever_of(prior, aligned):
+    """Of a small prior, whose objects are aligned only where that is asked for."""
+    config = preset("default")
+    if aligned:
+        alignment = dataclasses.replace(config.retrieval.alignment, from_objects=1)
+        own = dataclasses.replace(config.retrieval, alignment=alignment)
+        config = dataclasses.replace(config, retrieval=own)
+    return AppearanceRetriever(prior, config, 0)
 
 
 def scene(light=(1.0, 1.0, 1.0)):
@@ -74,9 +89,9 @@ def test_without_colours_shape_and_size_are_left(prior, retriever):
             assert ranked[0] == name
 
 
-def test_what_is_seen_lies_on_the_true_object_alone(prior, retriever):
+def test_what_is_seen_lies_on_the_true_object_alone(prior, aligner):
     frame, names = scene()
-    for object_id, look in retriever.evidence(frame).items():
+    for object_id, look in aligner.evidence(frame).items():
         score = dict(zip([prior.names[row] for row in look.rows], look.alignment, strict=True))
         if object_id == STRANGER:
             assert max(score.values()) < 0.7
@@ -87,7 +102,7 @@ def test_what_is_seen_lies_on_the_true_object_alone(prior, retriever):
         assert max(v for other, v in score.items() if other not in same) < score[name] - 0.15
 
 
-def test_colours_that_say_nothing_leave_it_to_alignment(prior, retriever):
+def test_colours_that_say_nothing_leave_it_to_alignment(prior, aligner):
     """Half of a box is hidden: its size is too small, and it still lies on the stored box."""
     frame, names = scene()
     segmap = frame.segmap.copy()
@@ -95,18 +110,18 @@ def test_colours_that_say_nothing_leave_it_to_alignment(prior, retriever):
     cut = columns > np.median(columns)
     segmap[rows[cut], columns[cut]] = 0
     grey = dataclasses.replace(frame, segmap=segmap, rgb=np.full_like(frame.rgb, 127))
-    probabilities = retriever.probabilities(grey, 3)
+    probabilities = aligner.probabilities(grey, 3)
     best = [prior.names[k] for k in np.argsort(-probabilities)[:2]]
     assert set(best) == {"red_box", "blue_box"} and names[3] in best
 
 
-def test_without_a_plane_nothing_is_aligned(retriever):
+def test_without_a_plane_nothing_is_aligned(aligner):
     frame, _ = scene()
     floating = np.where((frame.segmap == 0)[..., None], np.nan, frame.points)
     bare = dataclasses.replace(frame, points=floating.astype(np.float32))
     neutral = preset("default").retrieval.alignment.neutral
-    assert retriever.plane(bare) is None
-    assert all(np.all(look.alignment == neutral) for look in retriever.evidence(bare).values())
+    assert aligner.plane(bare) is None
+    assert all(np.all(look.alignment == neutral) for look in aligner.evidence(bare).values())
 
 
 def test_a_model_that_is_read_alone_is_that_of_the_object(prior):
