@@ -3,6 +3,7 @@ where it cannot be."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -53,13 +54,19 @@ def gather(
     config: KinConfig,
     sensor: SensorConfig,
     rng: np.random.Generator,
+    others: Sequence[NDArray[np.floating]] = (),
 ) -> Evidence:
     """From an object's observed points (n, 3), metres, camera frame. They are merged in cells, so
     that near and far parts count alike, and so would what is smeared beyond the object's edges: it
-    is left out."""
+    is left out.
+
+    others : (n, 3) points of other views of it, likewise: its surface was seen there too
+    """
     T_plane_cam = plane_frame(plane)
     points = dense_points(points, config.dense_cell, config.least_dense)
-    seen = rng.permutation(grid_subsample(points, config.cell))[: config.seen_points]
+    known = [dense_points(each, config.dense_cell, config.least_dense) for each in others]
+    seen = grid_subsample(np.concatenate([points, *known]), config.cell)
+    seen = rng.permutation(seen)[: config.seen_points]
     free = _free(points, frame, object_id, config, rng)
     placed = transform_points(T_plane_cam, free).astype(np.float32)
     # Below the plane nothing is, and everything about it says so already.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -41,17 +42,18 @@ def kin_hypotheses(
     prior: Prior,
     config: HypothesesConfig,
     seed: int,
+    others: Sequence[NDArray[np.floating]] = (),
 ) -> list[KinHypothesis]:
     """The best fits that differ, whose shares leave to the completion what speaks against them.
 
     points : (n, 3) observed, metres, camera frame. None where shapes have no plane to stand on, and
-    where no fit is convincing.
+    where no fit is convincing. others : the same of other views of it
     """
     kin = config.kin
     if plane is None or not kin.enabled:
         return []
     rng = child_rng(seed, "kin", object_id)
-    evidence = gather(points, frame, object_id, plane, kin, config.sensor, rng)
+    evidence = gather(points, frame, object_id, plane, kin, config.sensor, rng, others)
     if len(evidence.seen) < kin.least_seen:
         return []
     library = kin_library(prior, kin)

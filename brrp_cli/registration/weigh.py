@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,10 +12,19 @@ from brrp_cli.config import HypothesesConfig, WeighConfig
 from brrp_cli.frames.frame import Frame
 from brrp_cli.observation.pixel_noise import PixelNoise
 from brrp_cli.observation.support_plane import Plane
-from brrp_cli.registration.likelihood import evidence, log_likelihood, see
+from brrp_cli.registration.likelihood import SeenObject, evidence, log_likelihood, see
 from brrp_cli.registration.pose_search import Hypothesis
 
 Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class OtherView:
+    """seen : the object in another frame; T_view_cam : (4, 4) rigid, from this frame's camera to
+    that one's"""
+
+    seen: SeenObject
+    T_view_cam: Array
 
 
 def log_likelihoods(
@@ -24,8 +34,16 @@ def log_likelihoods(
     plane: Plane | None,
     noise: PixelNoise,
     config: HypothesesConfig,
+    others: Sequence[OtherView] = (),
+    votes: float = 1.0,
+    worth: float = np.inf,
 ) -> list[float]:
-    """Of each placement, against that it is none of the stored objects, nats."""
+    """Of each placement, against that it is none of the stored objects, nats.
+
+    others : views of the object, at rest, in other frames. Ratios of views that err independently
+    add up: the mean of all is counted `votes` times. Of placements whose ratio in this frame is
+    `worth` behind the best they are not asked.
+    """
     likelihood, sensor = config.likelihood, config.sensor
     seen = see(frame, object_id, plane, noise, sensor.patch, sensor.bleed, likelihood)
     best = max((each.alignment_score for each in placed), default=-np.inf)
@@ -34,10 +52,30 @@ def log_likelihoods(
         ratio = -np.inf
         if each.alignment_score >= best - likelihood.within:
             found = evidence(each.T_cam_model, each.model, seen, likelihood, config.search.colour)
-            resized = abs(np.log(each.scale)) > config.search.least_size_change
-            ratio = log_likelihood(found, likelihood) - likelihood.other_size * resized
+            ratio = log_likelihood(found, likelihood)
         ratios.append(ratio)
-    return ratios
+    if others:
+        least = max(ratios, default=-np.inf) - worth
+        for i, each in enumerate(placed):
+            if ratios[i] > least:
+                every = [ratios[i], *(_elsewhere(each, other, config) for other in others)]
+                ratios[i] = votes * float(np.mean(every))
+    resized = [abs(np.log(each.scale)) > config.search.least_size_change for each in placed]
+    return [
+        ratio - likelihood.other_size * other for ratio, other in zip(ratios, resized, strict=True)
+    ]
+
+
+def _elsewhere(placed: Hypothesis, view: OtherView, config: HypothesesConfig) -> float:
+    """Log likelihood ratio of a placement in another view."""
+    found = evidence(
+        view.T_view_cam @ placed.T_cam_model,
+        placed.model,
+        view.seen,
+        config.likelihood,
+        config.search.colour,
+    )
+    return log_likelihood(found, config.likelihood)
 
 
 def weigh(
