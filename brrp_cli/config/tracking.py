@@ -22,6 +22,9 @@ class SharpenConfig:
         are not searched for again
     worth : nats behind the best placement, of the newest frame, from which on the other views are
         not asked
+    twice, against : an object is not searched for again that `twice` views speak against, each by
+        `against` nats
+    samples : of free and occupied space that are kept of a view
     """
 
     views: int = 4
@@ -32,7 +35,10 @@ class SharpenConfig:
     agree: float = 0.004
     worse: float = 0.1
     sure: float = share(0.9)
-    worth: float = 15.0
+    worth: float = 5.0
+    twice: int = 2
+    against: float = 10.0
+    samples: int = 3000
 
 
 @dataclass(frozen=True)

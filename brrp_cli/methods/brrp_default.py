@@ -33,13 +33,20 @@ from brrp_cli.observation.soft_samples import soft_samples
 from brrp_cli.observation.support_plane import Plane
 from brrp_cli.prior.store import Prior
 from brrp_cli.reconstruction import OK, ObjectReconstruction, Retrieved, Similar
+from brrp_cli.registration.likelihood import see
 from brrp_cli.registration.model import search_model
 from brrp_cli.registration.pose_covariance import pose_covariance
 from brrp_cli.registration.pose_search import Hypothesis, search
 from brrp_cli.registration.ray_refinement import refine_by_rays
 from brrp_cli.registration.scale_scan import observed_cloud
 from brrp_cli.registration.verification import Verifier
-from brrp_cli.registration.weigh import log_likelihoods, weigh
+from brrp_cli.registration.weigh import (
+    SeenFrom,
+    best_ratios,
+    joint_log_likelihood,
+    log_likelihoods,
+    weigh,
+)
 from brrp_cli.retrieval.base import Retriever, top_k, unknown
 from brrp_cli.seeds import child_rng, child_seed
 from brrp_cli.timing import timed
@@ -113,28 +120,41 @@ def reconstruct_by_hypotheses(
                 )
             return found
 
-        def weighed(found: list[list[Hypothesis]]) -> tuple[list[Hypothesis], Array]:
+        def weighed(found: list[list[Hypothesis]]) -> tuple[list[Hypothesis], list[float], Array]:
             placed = [each for group in found for each in group]
             shares = [p for (_, p), group in zip(chosen, found, strict=True) for _ in group]
-            ratios = log_likelihoods(
-                placed,
-                frame,
-                object_id,
-                plane,
-                noise,
-                hypotheses,
-                views.others(),
-                views.votes(observation.center),
-                views.config.worth,
-            )
-            return placed, weigh(shares, ratios, missing, hypotheses.weigh)
+            alone = log_likelihoods(placed, frame, object_id, plane, noise, hypotheses)
+            joint = list(alone)
+            if views and max(alone, default=-np.inf) > -views.config.against:
+                least = max(alone) - views.config.worth
+                sensor = hypotheses.sensor
+                seen = see(
+                    frame,
+                    object_id,
+                    plane,
+                    noise,
+                    sensor.patch,
+                    sensor.bleed,
+                    hypotheses.likelihood,
+                )
+                every = [SeenFrom(seen, np.eye(4)), *views.seen()]
+                votes = views.votes(observation.center)
+                asked = np.flatnonzero(np.array(alone) > least)
+                for i in asked:
+                    placed[i] = _refined(placed[i], verifier, wave, hypotheses, views)
+                    joint[i] = joint_log_likelihood(placed[i], every, votes, hypotheses)
+                # The others stay as far behind as they were.
+                gained = max(joint[i] for i in asked) - max(alone)
+                for i in set(range(len(alone))) - set(asked.tolist()):
+                    joint[i] += gained
+            return placed, alone, weigh(shares, joint, missing, hypotheses.weigh)
 
-        found = searched(frozenset(begun) | lost)
-        placed, weights = weighed(found)
+        found = searched(frozenset(begun) | lost | views.hopeless())
+        placed, alone, weights = weighed(found)
         if begun and _heaviest(found, weights) < views.config.sure:
             # What started from the last frame is not sure: it is searched for as ever.
-            found = searched(frozenset())
-            placed, weights = weighed(found)
+            found = searched(views.hopeless())
+            placed, alone, weights = weighed(found)
         like: list[KinHypothesis] = []
         if weights[-1] >= hypotheses.kin.least_unknown:
             like = kin_hypotheses(
@@ -146,6 +166,7 @@ def reconstruct_by_hypotheses(
                 hypotheses,
                 seed,
                 views.points(),
+                views.depths(),
             )
     with timed(seconds, "inference"):
         shared = _shared_with_kin(weights, like)
@@ -182,9 +203,11 @@ def reconstruct_by_hypotheses(
             verifier.points,
             seen_now,
             [(each, float(weight)) for each, weight in zip(placed, weights, strict=False)],
-            lost | {name for name, _ in chosen},
+            best_ratios(placed, alone),
             guess,
             not views,
+            views.config.samples,
+            child_rng(seed, "remembered", object_id),
             hypotheses,
         )
     ends = np.cumsum([0, *(len(group) for group in found)])

@@ -20,6 +20,7 @@ from brrp_cli.config import HypothesesConfig, MeanConfig
 from brrp_cli.config.tracking import SharpenConfig
 from brrp_cli.frames.frame import Frame
 from brrp_cli.geometry import normalise, transform_points
+from brrp_cli.kin.evidence import OtherDepth
 from brrp_cli.methods.base import EarlierView
 from brrp_cli.observation.pixel_noise import PixelNoise
 from brrp_cli.observation.ray_samples import ObjectObservation
@@ -31,7 +32,7 @@ from brrp_cli.registration.model import search_model
 from brrp_cli.registration.pose_search import Hypothesis, start_from
 from brrp_cli.registration.ray_refinement import OtherRays
 from brrp_cli.registration.verification import Verifier
-from brrp_cli.registration.weigh import OtherView
+from brrp_cli.registration.weigh import SeenFrom
 
 Array = NDArray[np.float64]
 
@@ -73,9 +74,9 @@ class Remembered:
     """One object in one frame, metres, in that frame's camera frame.
 
     points : (n, 3) in random order; seen, samples, wave, plane : of the object and its frame, as
-    inference had them; probabilities : P(c|R) (n,); placed : what was left of its hypotheses, and
-    tried : the stored objects that were searched for; alone : the object has moved since earlier
-    views of it
+    inference had them, the samples thinned; probabilities : P(c|R) (n,); placed : its hypotheses;
+    ratios : name -> log likelihood ratio, nats, of this view alone; alone : the object has moved
+    since earlier views of it
     """
 
     frame: Frame
@@ -87,7 +88,7 @@ class Remembered:
     wave: float
     probabilities: Array
     placed: tuple[Placed, ...]
-    tried: frozenset[str]
+    ratios: dict[str, float]
     guess: Guess | None
     alone: bool
 
@@ -101,9 +102,11 @@ def remember(
     points: Array,
     probabilities: Array,
     placed: Sequence[tuple[Hypothesis, float]],
-    tried: frozenset[str],
+    ratios: dict[str, float],
     guess: Guess | None,
     alone: bool,
+    most_samples: int,
+    rng: np.random.Generator,
     config: HypothesesConfig,
 ) -> Remembered:
     """An object after inference, for the frames to come; placed : hypotheses and weights; the rest
@@ -112,20 +115,23 @@ def remember(
     seen = see(
         frame, observation.object_id, plane, noise, sensor.patch, sensor.bleed, config.likelihood
     )
+    samples = soft_samples(observation, frame, config.map.behind, sensor)
+    rows = rng.permutation(len(samples.points))[:most_samples]
+    thinned = SoftSamples(samples.points[rows], samples.targets[rows], samples.measured[rows])
     return Remembered(
         frame,
         observation.object_id,
         plane,
         points,
         seen,
-        soft_samples(observation, frame, config.map.behind, sensor),
+        thinned,
         wave,
         probabilities,
         tuple(
             Placed(h.model.stored.name, h.T_cam_model, h.scale, h.alignment_score, weight)
             for h, weight in placed
         ),
-        tried,
+        ratios,
         guess,
         alone,
     )
@@ -152,7 +158,11 @@ class EarlierViews:
         """What the stream says of one object."""
         return cls(
             tuple(
-                View(v.T_now_then, np.asarray(np.linalg.inv(v.T_now_then), np.float64), cast(Remembered, v.memory))
+                View(
+                    v.T_now_then,
+                    _inverse(v.T_now_then),
+                    cast(Remembered, v.memory),
+                )
                 for v in views
             ),
             config,
@@ -162,11 +172,22 @@ class EarlierViews:
         return bool(self.views)
 
     def lost(self, config: HypothesesConfig) -> frozenset[str]:
-        """The stored objects that were searched for and had no weight left in the last frame."""
+        """The stored objects that had no weight left in the last frame."""
         if not self.views:
             return frozenset()
         last, least = self.views[-1].memory, config.map.least_weight
-        return last.tried - {p.name for p in last.placed if p.weight >= least}
+        tried = {name for view in self.views for name in view.memory.ratios}
+        return frozenset(tried - {p.name for p in last.placed if p.weight >= least})
+
+    def hopeless(self) -> frozenset[str]:
+        """Those that `config.twice` views speak against, each by `config.against` nats."""
+        every = [
+            name
+            for view in self.views
+            for name, nats in view.memory.ratios.items()
+            if nats < -self.config.against
+        ]
+        return frozenset(name for name in every if every.count(name) >= self.config.twice)
 
     def probabilities(self, found: Array) -> Array:
         """P(c|R) (n,), the mean of all views, of the present one's `found` (n,)."""
@@ -188,9 +209,13 @@ class EarlierViews:
             for v in self.views
         ]
 
-    def others(self) -> list[OtherView]:
+    def seen(self) -> list[SeenFrom]:
         """Of each, for weighing a placement."""
-        return [OtherView(v.memory.seen, v.T_then_now) for v in self.views]
+        return [SeenFrom(v.memory.seen, v.T_then_now) for v in self.views]
+
+    def depths(self) -> list[OtherDepth]:
+        """Of each, for what cannot be in space that it saw to be free."""
+        return [OtherDepth(v.memory.frame, v.memory.object_id, v.T_then_now) for v in self.views]
 
     def votes(self, center: Array) -> float:
         """How many views of an object about `center` (3,), the present one with them, err
@@ -285,9 +310,13 @@ class EarlierViews:
             return True
         now = begun[was.name][0]
         surface = _moved(view.T_now_then @ was.T_cam_model, now.model.surface[:points])
-        local = _moved(np.asarray(np.linalg.inv(now.T_cam_model), np.float64), surface)
+        local = _moved(_inverse(now.T_cam_model), surface)
         return bool(np.abs(now.model.signed_distance(local)).mean() <= self.config.agree)
 
 
 def _moved(T_target_source: Array, points: NDArray[np.floating]) -> Array:
     return np.asarray(transform_points(T_target_source, points), dtype=np.float64)
+
+
+def _inverse(T: Array) -> Array:
+    return np.asarray(np.linalg.inv(T), dtype=np.float64)

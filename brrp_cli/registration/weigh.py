@@ -19,8 +19,8 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class OtherView:
-    """seen : the object in another frame; T_view_cam : (4, 4) rigid, from this frame's camera to
+class SeenFrom:
+    """seen : the object in a frame; T_view_cam : (4, 4) rigid, from the present frame's camera to
     that one's"""
 
     seen: SeenObject
@@ -34,16 +34,8 @@ def log_likelihoods(
     plane: Plane | None,
     noise: PixelNoise,
     config: HypothesesConfig,
-    others: Sequence[OtherView] = (),
-    votes: float = 1.0,
-    worth: float = np.inf,
 ) -> list[float]:
-    """Of each placement, against that it is none of the stored objects, nats.
-
-    others : views of the object, at rest, in other frames. Ratios of views that err independently
-    add up: the mean of all is counted `votes` times. Of placements whose ratio in this frame is
-    `worth` behind the best they are not asked.
-    """
+    """Of each placement, against that it is none of the stored objects, nats."""
     likelihood, sensor = config.likelihood, config.sensor
     seen = see(frame, object_id, plane, noise, sensor.patch, sensor.bleed, likelihood)
     best = max((each.alignment_score for each in placed), default=-np.inf)
@@ -52,30 +44,44 @@ def log_likelihoods(
         ratio = -np.inf
         if each.alignment_score >= best - likelihood.within:
             found = evidence(each.T_cam_model, each.model, seen, likelihood, config.search.colour)
-            ratio = log_likelihood(found, likelihood)
+            resized = abs(np.log(each.scale)) > config.search.least_size_change
+            ratio = log_likelihood(found, likelihood) - likelihood.other_size * resized
         ratios.append(ratio)
-    if others:
-        least = max(ratios, default=-np.inf) - worth
-        for i, each in enumerate(placed):
-            if ratios[i] > least:
-                every = [ratios[i], *(_elsewhere(each, other, config) for other in others)]
-                ratios[i] = votes * float(np.mean(every))
-    resized = [abs(np.log(each.scale)) > config.search.least_size_change for each in placed]
-    return [
-        ratio - likelihood.other_size * other for ratio, other in zip(ratios, resized, strict=True)
+    return ratios
+
+
+def joint_log_likelihood(
+    placed: Hypothesis, views: Sequence[SeenFrom], votes: float, config: HypothesesConfig
+) -> float:
+    """Of a placement, against that it is none of the stored objects, nats, in all views of it.
+
+    Ratios of views that err independently add up: the mean of all counts `votes` times.
+    """
+    likelihood = config.likelihood
+    ratios = [
+        log_likelihood(
+            evidence(
+                view.T_view_cam @ placed.T_cam_model,
+                placed.model,
+                view.seen,
+                likelihood,
+                config.search.colour,
+            ),
+            likelihood,
+        )
+        for view in views
     ]
+    resized = abs(np.log(placed.scale)) > config.search.least_size_change
+    return votes * float(np.mean(ratios)) - likelihood.other_size * resized
 
 
-def _elsewhere(placed: Hypothesis, view: OtherView, config: HypothesesConfig) -> float:
-    """Log likelihood ratio of a placement in another view."""
-    found = evidence(
-        view.T_view_cam @ placed.T_cam_model,
-        placed.model,
-        view.seen,
-        config.likelihood,
-        config.search.colour,
-    )
-    return log_likelihood(found, config.likelihood)
+def best_ratios(placed: Sequence[Hypothesis], ratios: Sequence[float]) -> dict[str, float]:
+    """Name -> log likelihood ratio, nats, of the best placement of each object."""
+    best: dict[str, float] = {}
+    for each, ratio in zip(placed, ratios, strict=True):
+        name = each.model.stored.name
+        best[name] = max(float(ratio), best.get(name, -np.inf))
+    return best
 
 
 def weigh(
