@@ -81,11 +81,13 @@ def reconstruct_by_hypotheses(
     object_id = observation.object_id
     views = earlier or EarlierViews((), SharpenConfig())
     verifier = Verifier(_shuffled(observation.points, seed, object_id), frame, plane)
-    with timed(seconds, "start"):
-        begun = views.begun(prior, verifier, hypotheses)
-        if not views.agree(begun, hypotheses.search.model_points):
-            # It has been moved: what was seen of it elsewhere is forgotten.
-            views, begun = EarlierViews((), views.config), {}
+    begun: dict[str, list[Hypothesis]] = {}
+    if views:
+        with timed(seconds, "start"):
+            begun = views.begun(prior, verifier, hypotheses)
+            if not views.agree(begun, hypotheses.search.model_points):
+                # It has been moved: what was seen of it elsewhere is forgotten.
+                views, begun = EarlierViews((), views.config), {}
     with timed(seconds, "retrieval"):
         seen_now = retriever.probabilities(frame, object_id)
         probabilities = views.probabilities(seen_now)
@@ -124,29 +126,11 @@ def reconstruct_by_hypotheses(
             placed = [each for group in found for each in group]
             shares = [p for (_, p), group in zip(chosen, found, strict=True) for _ in group]
             alone = log_likelihoods(placed, frame, object_id, plane, noise, hypotheses)
-            joint = list(alone)
+            joint = alone
             if views and max(alone, default=-np.inf) > -views.config.against:
-                least = max(alone) - views.config.worth
-                sensor = hypotheses.sensor
-                seen = see(
-                    frame,
-                    object_id,
-                    plane,
-                    noise,
-                    sensor.patch,
-                    sensor.bleed,
-                    hypotheses.likelihood,
+                placed, joint = _in_all_views(
+                    placed, alone, observation, verifier, wave, noise, hypotheses, views
                 )
-                every = [SeenFrom(seen, np.eye(4)), *views.seen()]
-                votes = views.votes(observation.center)
-                asked = np.flatnonzero(np.array(alone) > least)
-                for i in asked:
-                    placed[i] = _refined(placed[i], verifier, wave, hypotheses, views)
-                    joint[i] = joint_log_likelihood(placed[i], every, votes, hypotheses)
-                # The others stay as far behind as they were.
-                gained = max(joint[i] for i in asked) - max(alone)
-                for i in set(range(len(alone))) - set(asked.tolist()):
-                    joint[i] += gained
             return placed, alone, weigh(shares, joint, missing, hypotheses.weigh)
 
         found = searched(frozenset(begun) | lost | views.hopeless())
@@ -280,6 +264,48 @@ def _shared_with_kin(weights: Array, like: list[KinHypothesis]) -> Array:
     none = weights[-1]
     shares = [none * each.share for each in like]
     return np.array([*weights[:-1], *shares, none - sum(shares)])
+
+
+def _in_all_views(
+    placed: list[Hypothesis],
+    alone: list[float],
+    observation: ObjectObservation,
+    verifier: Verifier,
+    wave: float,
+    noise: PixelNoise,
+    config: HypothesesConfig,
+    views: EarlierViews,
+) -> tuple[list[Hypothesis], list[float]]:
+    """Placements fitted to the rays of all views, and their log likelihood ratios in all of them:
+    of those whose ratio in this frame, `alone`, comes near the best."""
+    sensor = config.sensor
+    seen = see(
+        verifier.frame,
+        observation.object_id,
+        verifier.plane,
+        noise,
+        sensor.patch,
+        sensor.bleed,
+        config.likelihood,
+    )
+    every = [SeenFrom(seen, np.eye(4)), *views.seen()]
+    votes = views.votes(observation.center)
+    near = [ratio > max(alone) - views.config.worth for ratio in alone]
+    placed = [
+        _refined(each, verifier, wave, config, views) if asked else each
+        for each, asked in zip(placed, near, strict=True)
+    ]
+    asked_ratios = [
+        joint_log_likelihood(each, every, votes, config) if asked else -np.inf
+        for each, asked in zip(placed, near, strict=True)
+    ]
+    # The others stay as far behind as they were.
+    gained = max(asked_ratios) - max(alone)
+    joint = [
+        ratio if asked else before + gained
+        for ratio, before, asked in zip(asked_ratios, alone, near, strict=True)
+    ]
+    return placed, joint
 
 
 def _heaviest(found: list[list[Hypothesis]], weights: Array) -> float:
