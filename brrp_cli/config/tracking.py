@@ -32,7 +32,7 @@ class SharpenConfig:
     rest: float = share(0.08)
     rest_gap: float = 0.012
     rest_depth: float = 0.002
-    agree: float = 0.004
+    agree: float = 0.002
     worse: float = 0.1
     sure: float = share(0.9)
     worth: float = 5.0

@@ -201,11 +201,13 @@ def test_the_view_of_the_other_side_halves_the_error_of_what_was_not_seen(folder
 
 @pytest.mark.slow
 def test_a_stored_object_starts_from_where_it_was_and_is_found_again_where_it_was_pushed(folder):
-    session = Reconstructor(folder, track=True)
+    session, other = (Reconstructor(folder, track=True, workers=n) for n in (1, 2))
     for number, (turned, x) in enumerate([(0.0, 0.09), (0.4, 0.09), (0.6, 0.03)]):
         mesh = in_camera(can(), placed(x, -0.04, 0.0))
         frame, T = seen_from(mesh, turned)
-        item = session(frame).objects[0]
+        item, again = session(frame).objects[0], other(frame).objects[0]
+        assert item.surface.vertices.tobytes() == again.surface.vertices.tobytes()
+        assert item.surface.uncertainty.tobytes() == again.surface.uncertainty.tobytes()
         assert item.recognised.name == "can"
         assert iou(item.surface, in_camera(mesh, T)) > 0.95
         memory = session._seen[item.object_id]
