@@ -1,7 +1,7 @@
 """Measure a session that tracks, with and without earlier views, on sequences with known truth.
 
     python tools/measure_tracking.py --seed 2 --sequences 4 --objects 6
-    python tools/measure_tracking.py --seed 2 --objects 5 --frames 7 --moved-in 2 --round-from 4
+    python tools/measure_tracking.py --seed 2 --frames 7 --moved-in 2 --round-from 4 --every
 
 Half of the objects are household shapes of the starter prior, the others are drawn at random and
 it lacks them. The camera stands at first and then goes round the table, its pose known or off by
