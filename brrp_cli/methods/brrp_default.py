@@ -17,14 +17,13 @@ from brrp_cli.completion.completed_mean import (
 )
 from brrp_cli.completion.visible_part import VisiblePart, visible_part
 from brrp_cli.config import Config, FittedMapConfig, HypothesesConfig, MeanConfig
-from brrp_cli.config.tracking import SharpenConfig
 from brrp_cli.frames.frame import Frame
 from brrp_cli.inference.hypothesis_posterior import HypothesisPosterior, MeanFunction
 from brrp_cli.inference.infer_hypotheses import Problem, infer_correction
 from brrp_cli.inference.mean_grid import MeanGrid, grid_over
 from brrp_cli.inference.placed_shape import PlacedShape
 from brrp_cli.inference.posterior import LOGISTIC_DEVIATION
-from brrp_cli.methods.earlier_views import EarlierViews, Guess, remember
+from brrp_cli.methods.earlier_views import ALONE, EarlierViews, Guess, remember
 from brrp_cli.methods.kin_hypotheses import KinHypothesis, kin_hypotheses
 from brrp_cli.observation.pixel_noise import PixelNoise
 from brrp_cli.observation.ray_samples import ObjectObservation
@@ -79,7 +78,7 @@ def reconstruct_by_hypotheses(
     assert hypotheses is not None
     seconds: dict[str, float] = {}
     object_id = observation.object_id
-    views = earlier or EarlierViews((), SharpenConfig())
+    views = earlier or ALONE
     verifier = Verifier(_shuffled(observation.points, seed, object_id), frame, plane)
     begun: dict[str, list[Hypothesis]] = {}
     if views:
@@ -349,7 +348,7 @@ def _placed_shape(
     observed: NDArray[np.float32],
     wave: float,
     config: HypothesesConfig,
-    views: EarlierViews,
+    views: EarlierViews = ALONE,
 ) -> PlacedShape:
     """The less the frame says for the placement, and the less it fixes its pose, the softer its
     surface."""

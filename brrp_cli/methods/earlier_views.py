@@ -314,6 +314,10 @@ class EarlierViews:
         return bool(np.abs(now.model.signed_distance(local)).mean() <= self.config.agree)
 
 
+# Of a frame that stands alone.
+ALONE = EarlierViews((), SharpenConfig())
+
+
 def _moved(T_target_source: Array, points: NDArray[np.floating]) -> Array:
     return np.asarray(transform_points(T_target_source, points), dtype=np.float64)
 
