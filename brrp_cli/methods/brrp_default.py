@@ -78,7 +78,7 @@ def reconstruct_by_hypotheses(
     assert hypotheses is not None
     seconds: dict[str, float] = {}
     object_id = observation.object_id
-    views = earlier or ALONE
+    views = ALONE if earlier is None else earlier
     verifier = Verifier(_shuffled(observation.points, seed, object_id), frame, plane)
     begun: dict[str, list[Hypothesis]] = {}
     if views:
