@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from brrp_cli.frames.frame import Frame
-from brrp_cli.methods.base import Setup
+from brrp_cli.methods.base import Setup, Stream
 from brrp_cli.methods.configuration import MethodConfig
 from brrp_cli.methods.posterior_file import open_posterior
 from brrp_cli.methods.registry import DEFAULT, reconstructing_method
@@ -39,6 +39,7 @@ def reconstruct(
     device: str = "auto",
     workers: int | None = None,
     only: Collection[int] | None = None,
+    stream: Stream | None = None,
 ) -> Reconstruction:
     """Reconstruct every object of a segmented frame.
 
@@ -50,6 +51,7 @@ def reconstruct(
     workers : objects at a time, by default as many as there are cores
     only : ids of the objects that are asked for, by default all; the others are still seen as
         objects
+    stream : what earlier frames of the same stream showed (sessions pass it)
 
     An object that cannot be reconstructed gets a status; the others still are. The frame is never
     changed. The same seed gives the same result, whatever the number of workers.
@@ -67,6 +69,7 @@ def reconstruct(
         weights=None if weights is None else Path(weights),
         workers=workers,
         only=None if only is None else frozenset(only),
+        stream=stream,
     )
     chosen.check(setup)
     start = time.perf_counter()

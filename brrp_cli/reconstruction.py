@@ -189,6 +189,7 @@ class ObjectReconstruction:
     posterior, surface : None unless the object got that far
     unknown_probability : that the prior does not hold the object; 0 where retrieval cannot tell
     seconds : time of each stage
+    memory : what its method wants to see again with the next frame of a stream
     """
 
     object_id: int
@@ -204,6 +205,7 @@ class ObjectReconstruction:
     posterior: StoredPosterior | None = None
     surface: Surface | None = None
     seconds: dict[str, float] = field(default_factory=dict)
+    memory: Any = None
 
     @property
     def recognised(self) -> Retrieved | None:

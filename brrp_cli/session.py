@@ -11,20 +11,33 @@ from __future__ import annotations
 import time
 from collections.abc import Collection, Iterable, Iterator
 from dataclasses import asdict, replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
+import numpy as np
+
 from brrp_cli.api import reconstruct
 from brrp_cli.config.segmentation import SegmentConfig
-from brrp_cli.config.tracking import TrackConfig
+from brrp_cli.config.tracking import SharpenConfig, TrackConfig
 from brrp_cli.errors import FrameError
 from brrp_cli.frames.frame import Frame
-from brrp_cli.mending import mend
+from brrp_cli.geometry import normalise
+from brrp_cli.mending import Again, mend
+from brrp_cli.methods.base import EarlierView, Memory, Stream
 from brrp_cli.methods.configuration import MethodConfig
 from brrp_cli.methods.registry import DEFAULT, reconstructing_method
 from brrp_cli.prior.store import Prior, open_prior
-from brrp_cli.reconstruction import Reconstruction
-from brrp_cli.tracking import Followed, first_frame, follow, unmoved
+from brrp_cli.reconstruction import ObjectReconstruction, Reconstruction
+from brrp_cli.tracking import (
+    Followed,
+    at_rest,
+    camera_motion,
+    first_frame,
+    follow,
+    spread_out,
+    unmoved,
+)
 
 if TYPE_CHECKING:
     from brrp_cli.retrieval.base import Retriever
@@ -40,7 +53,8 @@ class Reconstructor:
     prompt : makes masks of what it names where a frame has none; None = of what stands on the
         table, without a model; segmentation : the numbers of both
     track : whether frames are those of one stream: an object keeps its id, and one that has not
-        moved before a camera that stands keeps its result; or the numbers of that
+        moved before a camera that stands keeps its result, and what earlier frames showed of one
+        at rest joins what the newest shows; or the numbers of that
 
     Without `track` the same frame and seed give the same result as a process of its own.
     Errors: BrrpError.
@@ -67,6 +81,8 @@ class Reconstructor:
         self._last: Followed | None = None
         # Frames, and what was inferred from each and still holds.
         self._made: list[tuple[Frame, Reconstruction]] = []
+        # Of each object, the frames that showed it and what the method remembers of them.
+        self._seen: dict[int, list[tuple[Frame, Memory]]] = {}
         self._workers = workers
         self._method, self._seed, self._device, self._prompt = method, seed, device, prompt
         self._weights = weights
@@ -122,26 +138,67 @@ class Reconstructor:
             ]
         seconds = time.perf_counter() - start
         todo = set(seen.object_ids) - {item.object_id for item in kept}
+        stream = self._stream(seen, todo)
+        infer = partial(self._all, stream=stream)
         if todo or not self._made:
-            result = self._all(seen, todo)
+            result = infer(seen, todo)
         else:
             result = replace(self._made[0][1], frame=seen, objects=[], seconds={})
         objects = sorted([*result.objects, *kept], key=lambda item: item.object_id)
         result = replace(result, objects=objects)
         if mends:
-            result = self._mended(result, followed.next_id)
+            result = self._mended(result, followed.next_id, infer)
         result.seconds["tracking"] = seconds
         # Mending may have made anew what was kept.
         was = {item.object_id: item for item in kept}
         new = [item for item in result.objects if was.get(item.object_id) is not item]
         left = self._only(was.keys() - {item.object_id for item in new})
+        if stream is not None:
+            self._remember(result.frame, new, stream.config)
         self._made = [(result.frame, replace(result, objects=new)), *left] if new else left
         next_id = max(followed.next_id, max(result.frame.object_ids) + 1)
         self._last = Followed(result.frame, next_id)
         return result
 
-    def _mended(self, result: Reconstruction, first_free: int = 1) -> Reconstruction:
-        return mend(result, self._prior, self._all, self._segmentation.mend, first_free)
+    def _mended(
+        self, result: Reconstruction, first_free: int = 1, again: Again | None = None
+    ) -> Reconstruction:
+        return mend(result, self._prior, again or self._all, self._segmentation.mend, first_free)
+
+    def _stream(self, frame: Frame, ids: Collection[int]) -> Stream | None:
+        """What earlier frames showed of those objects of this one that are at rest since; all else
+        of them is forgotten."""
+        track = self._track
+        if track is None or track.sharpen is None:
+            return None
+        here = set(frame.object_ids)
+        self._seen = {i: views for i, views in self._seen.items() if i in here}
+        earlier: dict[int, tuple[EarlierView, ...]] = {}
+        for object_id in self._seen.keys() & set(ids):
+            rest = []
+            for then, memory in self._seen[object_id]:
+                T = camera_motion(then, frame, track)
+                if T is not None and at_rest(then, frame, T, object_id, track.sharpen):
+                    rest.append((then, EarlierView(T, memory)))
+            self._seen[object_id] = [(then, view.memory) for then, view in rest]
+            earlier[object_id] = tuple(view for _, view in rest)
+        return Stream(earlier, track.sharpen)
+
+    def _remember(
+        self, frame: Frame, new: list[ObjectReconstruction], config: SharpenConfig
+    ) -> None:
+        """The newest view of what was inferred, and of the earlier ones those from the most
+        different sides."""
+        assert self._track is not None
+        for item in new:
+            memory, item.memory = item.memory, None
+            if memory is None or item.center is None:
+                continue
+            views = [] if memory.alone else self._seen.get(item.object_id, [])
+            motions = [camera_motion(then, frame, self._track) for then, _ in views]
+            toward = [T[:3, 3] - item.center for T in motions if T is not None]
+            kept = spread_out(normalise(np.reshape(toward, (-1, 3))), config.views - 1)
+            self._seen[item.object_id] = [*(views[i] for i in kept), (frame, memory)]
 
     def _only(self, ids: Collection[int]) -> list[tuple[Frame, Reconstruction]]:
         """What was made of earlier frames, of the objects `ids`."""
@@ -151,7 +208,12 @@ class Reconstructor:
         ]
         return [(frame, made) for frame, made in left if made.objects]
 
-    def _all(self, frame: Frame, only: Collection[int] | None = None) -> Reconstruction:
+    def _all(
+        self,
+        frame: Frame,
+        only: Collection[int] | None = None,
+        stream: Stream | None = None,
+    ) -> Reconstruction:
         return reconstruct(
             frame,
             self._prior,
@@ -163,6 +225,7 @@ class Reconstructor:
             device=self._device,
             workers=self._workers,
             only=only,
+            stream=stream,
         )
 
     def stream(self, frames: Iterable[Frame]) -> Iterator[Reconstruction | FrameError]:

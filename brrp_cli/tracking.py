@@ -13,9 +13,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from brrp_cli.config.tracking import TrackConfig
+from brrp_cli.config.tracking import SharpenConfig, TrackConfig
 from brrp_cli.frames.frame import BACKGROUND, Frame
-from brrp_cli.frames.projection import at_pixels
+from brrp_cli.frames.projection import at_pixels, depth_behind
 from brrp_cli.geometry import transform_points
 
 
@@ -53,6 +53,49 @@ def unmoved(before: Frame, frame: Frame, config: TrackConfig) -> frozenset[int]:
         return frozenset()
     common = set(before.object_ids) & set(frame.object_ids)
     return frozenset(i for i in common if _unmoved(before, frame, i, config))
+
+
+def at_rest(
+    before: Frame,
+    frame: Frame,
+    T_now_then: NDArray[np.float64],
+    object_id: int,
+    config: SharpenConfig,
+) -> bool:
+    """Whether an object of two frames of one stream, whose camera has moved by T_now_then (4, 4),
+    is where it was, as far as both show it."""
+    T_then_now = np.asarray(np.linalg.inv(T_now_then))
+    return all(
+        _agrees(one, other, T, object_id, config)
+        for one, other, T in ((before, frame, T_now_then), (frame, before, T_then_now))
+    )
+
+
+def _agrees(
+    one: Frame, other: Frame, T: NDArray[np.float64], object_id: int, config: SharpenConfig
+) -> bool:
+    """Whether little of what one frame saw of an object lies in space that the other saw to be
+    free, and depth is the same where both saw it."""
+    points = transform_points(T, one.object_points(object_id))
+    gap = depth_behind(points, other)
+    known = np.isfinite(gap)
+    if not known.any() or (gap[known] > config.rest_gap).mean() > config.rest:
+        return False
+    both = known & (np.abs(gap) < config.rest_gap)
+    both &= at_pixels(points, other.segmap, other) == object_id
+    # Nothing of it was seen twice: from its other side, nothing speaks against it.
+    return not both.any() or abs(float(np.median(gap[both]))) <= config.rest_depth
+
+
+def spread_out(directions: NDArray[np.float64], count: int) -> list[int]:
+    """Which of unit directions (n, 3), oldest first, are kept: of the two nearest to each other the
+    older one goes until `count` are left."""
+    kept = list(range(len(directions)))
+    while len(kept) > count:
+        near = directions[kept] @ directions[kept].T
+        near[np.tril_indices(len(kept))] = -np.inf
+        kept.pop(int(np.unravel_index(np.argmax(near), near.shape)[0]))
+    return kept
 
 
 def camera_motion(last: Frame, frame: Frame, config: TrackConfig) -> NDArray[np.float64] | None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -10,15 +10,16 @@ from sphere_method import METHOD, Sphere
 from table_scene import SHAPE, K, in_camera
 
 from brrp_cli import Reconstructor
-from brrp_cli.config.tracking import TrackConfig
+from brrp_cli.config.tracking import SharpenConfig, TrackConfig
 from brrp_cli.demo.layout import camera_pose
 from brrp_cli.frames.frame import Frame
 from brrp_cli.geometry import backproject
 from brrp_cli.methods import base
 from brrp_cli.methods.registry import METHODS
 from brrp_cli.raycast import look
+from brrp_cli.reconstruction import ObjectReconstruction
 from brrp_cli.shapes import solids
-from brrp_cli.tracking import camera_motion, first_frame, follow
+from brrp_cli.tracking import at_rest, camera_motion, first_frame, follow, spread_out
 
 RED, GREEN, BLUE = (200, 60, 50), (60, 180, 70), (60, 80, 200)
 YAW = 0.4
@@ -148,3 +149,80 @@ def test_the_cameras_motion_is_that_of_its_poses_or_none_where_nobody_knows():
     assert pytest.approx(np.eye(4)) == camera_motion(blind, scene(START, noise=0.001), config)
     followed = follow(first_frame(here), there, config)
     assert followed.next_id == 4
+
+
+@dataclass(frozen=True)
+class Noted:
+    """What the test's method remembers of an object: the frame's yaw."""
+
+    yaw: float
+    alone: bool = False
+
+
+@pytest.fixture
+def earlier(inferred, monkeypatch):
+    """Like `inferred`, of a method that remembers; the streams it was given, call by call."""
+    given: list[base.Stream | None] = []
+    method = METHODS["sphere"]
+
+    def run(frame, setup: base.Setup):
+        given.append(setup.stream)
+        result = method.run(frame, setup)
+        for item in result.objects:
+            item.memory = Noted(float(np.arctan2(*frame.T_world_cam[1::-1, 3])))
+        return result
+
+    monkeypatch.setitem(METHODS, "sphere", replace(method, run=run))
+    return given
+
+
+def test_an_object_at_rest_is_remembered_and_one_that_moved_forgotten(earlier):
+    config = TrackConfig(sharpen=SharpenConfig(views=3))
+    session = Reconstructor(method="sphere", track=config)
+    first = session(scene(START, yaw=0.4, known=True))
+    assert earlier[0].earlier == {}
+    assert all(isinstance(o, ObjectReconstruction) and o.memory is None for o in first.objects)
+    ids = {colour_of(first.frame, i): i for i in first.frame.object_ids}
+    session(scene(START, yaw=0.5, known=True))
+    session(scene(START, yaw=0.9, known=True))
+    views = earlier[2].earlier[ids[RED]]
+    assert [v.memory.yaw for v in views] == pytest.approx([0.4, 0.5])
+    here, then = (camera_pose(np.array([0.0, 0.0, 0.03]), 0.7, 0.7, yaw) for yaw in (0.9, 0.4))
+    assert pytest.approx(np.linalg.inv(here) @ then) == views[0].T_now_then
+
+    moved = START | {GREEN: (0.12, 0.05)}
+    session(scene(moved, yaw=1.0, known=True))
+    assert earlier[3].earlier[ids[GREEN]] == ()
+    assert [v.memory.yaw for v in earlier[3].earlier[ids[RED]]] == pytest.approx([0.4, 0.5, 0.9])
+    session(scene(moved, yaw=1.3, known=True))
+    assert [v.memory.yaw for v in earlier[4].earlier[ids[GREEN]]] == pytest.approx([1.0])
+    # Of 0.4 and 0.5, which are next to each other, the older one has made room for 1.0.
+    assert [v.memory.yaw for v in earlier[4].earlier[ids[RED]]] == pytest.approx([0.5, 0.9, 1.0])
+
+
+def test_nothing_is_remembered_where_nobody_asks_for_it(earlier):
+    session = Reconstructor(method="sphere", track=TrackConfig(sharpen=None))
+    for yaw in (0.4, 0.6):
+        session(scene(START, yaw=yaw, known=True))
+    assert earlier == [None, None]
+
+
+def test_what_is_seen_from_its_other_side_is_at_rest_and_what_was_pushed_is_not():
+    config = SharpenConfig()
+    before = scene(START, yaw=0.4, known=True)
+    after = scene(START | {GREEN: (0.12, 0.0)}, yaw=0.4 + np.pi, known=True)
+    T = camera_motion(before, after, TrackConfig())
+    after = follow(first_frame(before), after, TrackConfig()).frame
+    ids = {colour_of(before, i): i for i in before.object_ids}
+    assert {colour_of(after, i): i for i in after.object_ids} == ids
+    assert at_rest(before, after, T, ids[RED], config)
+    assert at_rest(before, after, T, ids[BLUE], config)
+    assert not at_rest(before, after, T, ids[GREEN], config), "2 cm to the side"
+
+
+def test_of_many_views_those_from_the_most_different_sides_are_kept():
+    angles = np.array([0.0, 1.0, 1.1, 2.0, 3.0])
+    directions = np.stack([np.cos(angles), np.sin(angles), 0 * angles], axis=1)
+    assert spread_out(directions, 4) == [0, 2, 3, 4]
+    assert spread_out(directions, 5) == [0, 1, 2, 3, 4]
+    assert spread_out(directions[:0], 3) == []

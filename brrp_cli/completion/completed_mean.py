@@ -24,7 +24,16 @@ def completed_grid(
     nodes: Array, empty: NDArray[np.bool_], part: VisiblePart, config: MeanConfig
 ) -> NDArray[np.float16]:
     """Logits (nx, ny, nz) at nodes (nx, ny, nz, 3), metres, camera frame, of an object that is none
-    of the stored ones; the least where it is empty.
+    of the stored ones; the least where it is empty."""
+    guess = network_grid(nodes, empty, part, config)
+    crust = crust_of(nodes[~empty], part.frame, part.object_id, shell_of(nodes, config), config)
+    return with_crust(guess, empty, crust, config)
+
+
+def network_grid(
+    nodes: Array, empty: NDArray[np.bool_], part: VisiblePart, config: MeanConfig
+) -> Floats:
+    """What the network thinks (nx, ny, nz) at nodes (nx, ny, nz, 3); anything where it is empty.
 
     The network is asked at every second node along each axis, and at the nodes between where those
     around are neither all out of doubt (`beyond_doubt`) inside nor all outside.
@@ -46,11 +55,25 @@ def completed_grid(
         doubtful = doubtful.repeat(2, axis=axis).take(np.arange(count), axis=axis)
     doubtful &= ~empty
     asked[doubtful] = _network(nodes[doubtful], part)
+    return asked
+
+
+def with_crust(
+    guess: Floats, empty: NDArray[np.bool_], crust: NDArray[np.bool_], config: MeanConfig
+) -> NDArray[np.float16]:
+    """Logits (nx, ny, nz), limited: the network's `guess` (nx, ny, nz), the least where it is
+    empty. What was seen, `crust` (n,) of the nodes that are not empty, is occupied, however thin
+    the walls are that the network thinks of."""
     logits = np.full(empty.shape, -config.limit, np.float16)
-    spacing = float(np.linalg.norm(nodes[1, 0, 0] - nodes[0, 0, 0]))
-    shell = max(config.shell, config.shell_nodes * spacing)
-    logits[~empty] = _with_crust(asked[~empty], nodes[~empty], part, shell, config)
+    limited = np.clip(guess[~empty], -config.limit, config.limit)
+    logits[~empty] = np.where(crust, np.maximum(limited, config.shell_logit), limited)
     return logits
+
+
+def shell_of(nodes: Array, config: MeanConfig) -> float:
+    """Metres, how thick what was seen is on a grid of nodes (nx, ny, nz, 3)."""
+    spacing = float(np.linalg.norm(nodes[1, 0, 0] - nodes[0, 0, 0]))
+    return max(config.shell, config.shell_nodes * spacing)
 
 
 def _network(points: Array, part: VisiblePart) -> Floats:
@@ -66,16 +89,16 @@ def _doubled(values: Floats, axis: int, count: int) -> Floats:
     return np.moveaxis(found[:count], 0, axis)
 
 
-def _with_crust(
-    logits: Floats, points: Array, part: VisiblePart, shell: float, config: MeanConfig
-) -> Array:
-    """The network's logits (n,) at points (n, 3), limited. What was seen is `shell` metres thick,
-    however thin the walls are that the network thinks of."""
-    limited = np.clip(logits, -config.limit, config.limit)
-    behind = -depth_behind(points, part.frame)
-    own = at_pixels(points, part.frame.segmap, part.frame) == part.object_id
-    in_shell = own & (np.nan_to_num(behind, nan=np.inf) < shell) & (behind > -config.shell_before)
-    return np.where(in_shell, np.maximum(limited, config.shell_logit), limited)
+def crust_of(
+    points: Array, frame: Frame, object_id: int, shell: float, config: MeanConfig
+) -> NDArray[np.bool_]:
+    """Which of points (n, 3), metres, camera frame, lie in what was seen of an object, `shell`
+    metres thick."""
+    behind = -depth_behind(points, frame)
+    own = at_pixels(points, frame.segmap, frame) == object_id
+    return np.asarray(
+        own & (np.nan_to_num(behind, nan=np.inf) < shell) & (behind > -config.shell_before)
+    )
 
 
 def empty_space(

@@ -2,9 +2,43 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from brrp_cli.config.ranges import share
+
+
+@dataclass(frozen=True)
+class SharpenConfig:
+    """What earlier views of an object tell of it. Lengths are metres.
+
+    views : of an object that are kept: the newest, and those from the most different sides
+    side : radians between two views from which on they err independently of each other
+    rest : share of the points of one view that may lie in space which the other saw to be free,
+        more than `rest_gap` in front of what it measured; rest_depth : median by which their depths
+        differ at most, where both saw the object. An object for which this does not hold has moved
+    agree : mean distance between a placement and the earlier one from which on the object has moved
+    worse : by which the alignment score of an earlier placement may fall before its object is
+        searched for again; sure : weight of an object from which on others that have lost before
+        are not searched for again
+    worth : nats behind the best placement, of the newest frame, from which on the other views are
+        not asked
+    twice, against : an object is not searched for again that `twice` views speak against, each by
+        `against` nats
+    samples : of free and occupied space that are kept of a view
+    """
+
+    views: int = 4
+    side: float = 0.5
+    rest: float = share(0.08)
+    rest_gap: float = 0.012
+    rest_depth: float = 0.002
+    agree: float = 0.002
+    worse: float = 0.1
+    sure: float = share(0.9)
+    worth: float = 5.0
+    twice: int = 2
+    against: float = 10.0
+    samples: int = 3000
 
 
 @dataclass(frozen=True)
@@ -23,6 +57,7 @@ class TrackConfig:
     pose is given, a camera stands if both images share a share `ground` of background with depth,
     which has changed by `still` at most in the middle and `still_tail` times that in nine tenths of
     it, and its colours by `still_colour`, of 255
+    sharpen : how earlier views of an object join the newest one; None = they do not
     """
 
     overlap: float = share(0.3)
@@ -36,3 +71,4 @@ class TrackConfig:
     ground: float = share(0.2)
     still_tail: float = 5.0
     still_colour: float = 10.0
+    sharpen: SharpenConfig | None = field(default_factory=SharpenConfig)

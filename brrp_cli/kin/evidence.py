@@ -3,6 +3,7 @@ where it cannot be."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,13 +23,24 @@ Floats = NDArray[np.float32]
 
 
 @dataclass(frozen=True)
+class OtherDepth:
+    """The frame of another view of the object; T_view_cam : (4, 4) rigid, from the present frame's
+    camera to that one's"""
+
+    frame: Frame
+    object_id: int
+    T_view_cam: Array
+
+
+@dataclass(frozen=True)
 class Evidence:
     """Metres, in the frame of the support plane (z up, 0 on it), in random order.
 
     seen : (n, 3) points of the surface; free : (m, 3) of space that was seen to be free, most of it
     about the silhouette; eye : (3,) the camera; T_cam_plane : (4, 4)
     depth : (H, W) metres, NaN beside the silhouette, where a pixel may be anyone's; noise : metres,
-    standard deviation of one depth measurement
+    standard deviation of one depth measurement; others : depth, frame and T_view_cam (4, 4) of
+    other views of it
     """
 
     seen: Floats
@@ -38,11 +50,16 @@ class Evidence:
     frame: Frame
     depth: Floats
     noise: float
+    others: tuple[tuple[Floats, Frame, Array], ...] = ()
 
     def free_depth(self, points: NDArray[np.floating]) -> Array:
         """How far (n,) points (n, 3), metres, camera frame, stand in space that was seen to be
         free; NaN where nothing tells: beside the silhouette, where a pixel may be anyone's."""
-        return np.asarray(at_pixels(points, self.depth, self.frame) - points[:, 2])
+        gap = at_pixels(points, self.depth, self.frame) - points[:, 2]
+        for depth, frame, T_view_cam in self.others:
+            there = transform_points(T_view_cam, points)
+            gap = np.fmax(gap, at_pixels(there, depth, frame) - there[:, 2])
+        return np.asarray(gap)
 
 
 def gather(
@@ -53,13 +70,21 @@ def gather(
     config: KinConfig,
     sensor: SensorConfig,
     rng: np.random.Generator,
+    others: Sequence[NDArray[np.floating]] = (),
+    depths: Sequence[OtherDepth] = (),
 ) -> Evidence:
     """From an object's observed points (n, 3), metres, camera frame. They are merged in cells, so
     that near and far parts count alike, and so would what is smeared beyond the object's edges: it
-    is left out."""
+    is left out.
+
+    others : (n, 3) points of other views of it, likewise: its surface was seen there too; depths :
+    what these measured
+    """
     T_plane_cam = plane_frame(plane)
     points = dense_points(points, config.dense_cell, config.least_dense)
-    seen = rng.permutation(grid_subsample(points, config.cell))[: config.seen_points]
+    known = [dense_points(each, config.dense_cell, config.least_dense) for each in others]
+    seen = grid_subsample(np.concatenate([points, *known]), config.cell)
+    seen = rng.permutation(seen)[: config.seen_points]
     free = _free(points, frame, object_id, config, rng)
     placed = transform_points(T_plane_cam, free).astype(np.float32)
     # Below the plane nothing is, and everything about it says so already.
@@ -71,6 +96,10 @@ def gather(
         frame,
         _told_depth(frame, object_id, config),
         float(depth_deviation(np.median(points[:, 2]), sensor)),
+        tuple(
+            (_told_depth(each.frame, each.object_id, config), each.frame, each.T_view_cam)
+            for each in depths
+        ),
     )
 
 

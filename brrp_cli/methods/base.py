@@ -9,8 +9,12 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
+import numpy as np
+from numpy.typing import NDArray
+
+from brrp_cli.config.tracking import SharpenConfig
 from brrp_cli.errors import BrrpError, PriorError, WeightsError
 from brrp_cli.methods.configuration import MethodConfig
 
@@ -21,6 +25,37 @@ if TYPE_CHECKING:
     from brrp_cli.retrieval.base import Retriever
 
 
+class Memory(Protocol):
+    """What a method remembers of one object of a frame; the rest is its own.
+
+    alone : whether earlier views were of no use to it: the object has moved since
+    """
+
+    @property
+    def alone(self) -> bool:
+        """See above."""
+
+
+@dataclass(frozen=True)
+class EarlierView:
+    """One object as an earlier frame of a stream showed it, at rest since.
+
+    T_now_then : (4, 4) rigid, from that frame's camera to the present one's
+    memory : `ObjectReconstruction.memory`
+    """
+
+    T_now_then: NDArray[np.float64]
+    memory: Memory
+
+
+@dataclass(frozen=True)
+class Stream:
+    """earlier : object id -> its earlier views, oldest first; config : what is made of them"""
+
+    earlier: Mapping[int, tuple[EarlierView, ...]]
+    config: SharpenConfig
+
+
 @dataclass(frozen=True)
 class Setup:
     """What a method may need besides the frame.
@@ -29,6 +64,7 @@ class Setup:
     prior, retriever, weights : only where the method uses them
     workers : objects at a time; None = as many as there are cores. Results do not depend on it
     only : the ids that are asked for, for a method that works `object_by_object`; None = all
+    stream : of which the frame is one, for a method that remembers; None = the frame stands alone
     """
 
     config: Any
@@ -39,6 +75,7 @@ class Setup:
     weights: Path | None = None
     workers: int | None = None
     only: frozenset[int] | None = None
+    stream: Stream | None = None
 
 
 def _no_posteriors() -> tuple[type[StoredPosterior], ...]:

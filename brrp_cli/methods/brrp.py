@@ -24,6 +24,7 @@ def run(frame: Frame, setup: Setup) -> Reconstruction:
     from brrp_cli.methods.brrp_default import reconstruct_by_hypotheses
     from brrp_cli.methods.brrp_paper import reconstruct_object
     from brrp_cli.methods.each_object import too_few, with_surface
+    from brrp_cli.methods.earlier_views import EarlierViews
     from brrp_cli.observation.pixel_noise import pixel_noise
     from brrp_cli.observation.ray_samples import observe
     from brrp_cli.observation.sensor_noise import wave_deviation
@@ -53,6 +54,11 @@ def run(frame: Frame, setup: Setup) -> Reconstruction:
             return reconstruct_object(
                 frame, observation, prior, retriever, config, seed=seed, device=device
             )
+        earlier = None
+        if setup.stream is not None:
+            earlier = EarlierViews.of(
+                setup.stream.earlier.get(observation.object_id, ()), setup.stream.config
+            )
         return reconstruct_by_hypotheses(
             frame,
             scene.plane,
@@ -64,6 +70,7 @@ def run(frame: Frame, setup: Setup) -> Reconstruction:
             config,
             seed=seed,
             device=device,
+            earlier=earlier,
         )
 
     def whole(object_id: int) -> ObjectReconstruction:

@@ -3,11 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
-from brrp_cli.completion.completed_mean import completed_grid, empty_space
+from brrp_cli.completion.completed_mean import (
+    crust_of,
+    empty_space,
+    network_grid,
+    shell_of,
+    with_crust,
+)
 from brrp_cli.completion.visible_part import VisiblePart, visible_part
 from brrp_cli.config import Config, FittedMapConfig, HypothesesConfig, MeanConfig
 from brrp_cli.frames.frame import Frame
@@ -16,6 +23,7 @@ from brrp_cli.inference.infer_hypotheses import Problem, infer_correction
 from brrp_cli.inference.mean_grid import MeanGrid, grid_over
 from brrp_cli.inference.placed_shape import PlacedShape
 from brrp_cli.inference.posterior import LOGISTIC_DEVIATION
+from brrp_cli.methods.earlier_views import ALONE, EarlierViews, Guess, remember
 from brrp_cli.methods.kin_hypotheses import KinHypothesis, kin_hypotheses
 from brrp_cli.observation.pixel_noise import PixelNoise
 from brrp_cli.observation.ray_samples import ObjectObservation
@@ -24,13 +32,20 @@ from brrp_cli.observation.soft_samples import soft_samples
 from brrp_cli.observation.support_plane import Plane
 from brrp_cli.prior.store import Prior
 from brrp_cli.reconstruction import OK, ObjectReconstruction, Retrieved, Similar
+from brrp_cli.registration.likelihood import see
 from brrp_cli.registration.model import search_model
 from brrp_cli.registration.pose_covariance import pose_covariance
 from brrp_cli.registration.pose_search import Hypothesis, search
 from brrp_cli.registration.ray_refinement import refine_by_rays
 from brrp_cli.registration.scale_scan import observed_cloud
 from brrp_cli.registration.verification import Verifier
-from brrp_cli.registration.weigh import log_likelihoods, weigh
+from brrp_cli.registration.weigh import (
+    SeenFrom,
+    best_ratios,
+    joint_log_likelihood,
+    log_likelihoods,
+    weigh,
+)
 from brrp_cli.retrieval.base import Retriever, top_k, unknown
 from brrp_cli.seeds import child_rng, child_seed
 from brrp_cli.timing import timed
@@ -50,61 +65,105 @@ def reconstruct_by_hypotheses(
     *,
     seed: int,
     device: str,
+    earlier: EarlierViews | None = None,
 ) -> ObjectReconstruction:
     """Posterior of one object from hypotheses about the k retrieved objects and from the one that
     it is none of them, each corrected by what was observed.
 
     wave : metres, standard deviation of the mean depth of a patch (observation/sensor_noise.py);
-    noise : of the frame's pixels
+    noise : of the frame's pixels; earlier : views of the object in the stream's earlier frames;
+    None = there is no stream
     """
     hypotheses = config.hypotheses
     assert hypotheses is not None
     seconds: dict[str, float] = {}
     object_id = observation.object_id
+    views = ALONE if earlier is None else earlier
+    verifier = Verifier(_shuffled(observation.points, seed, object_id), frame, plane)
+    begun: dict[str, list[Hypothesis]] = {}
+    if views:
+        with timed(seconds, "start"):
+            begun = views.begun(prior, verifier, hypotheses)
+            if not views.agree(begun, hypotheses.search.model_points):
+                # It has been moved: what was seen of it elsewhere is forgotten.
+                views, begun = EarlierViews((), views.config), {}
     with timed(seconds, "retrieval"):
-        probabilities = retriever.probabilities(frame, object_id)
+        seen_now = retriever.probabilities(frame, object_id)
+        probabilities = views.probabilities(seen_now)
         chosen = top_k(probabilities, prior.names, config.k)
+        chosen += [
+            (name, float(probabilities[prior.names.index(name)]))
+            for name in begun
+            if name not in dict(chosen)
+        ]
         missing = unknown(probabilities)
     with timed(seconds, "registration"):
-        verifier = Verifier(_shuffled(observation.points, seed, object_id), frame, plane)
         observed = observed_cloud(observation.points, config.features)
-        found: list[list[Hypothesis]] = []
-        for name, _ in chosen:
-            found.append(
-                search(
-                    search_model(prior.load(name)),
-                    observed,
-                    verifier,
-                    config.features,
-                    hypotheses.search,
-                    child_seed(seed, object_id),
-                    max(
-                        (each.alignment_score for group in found for each in group), default=-np.inf
-                    ),
+        lost = views.lost(hypotheses) if begun else frozenset()
+
+        def searched(skipped: frozenset[str]) -> list[list[Hypothesis]]:
+            found: list[list[Hypothesis]] = []
+            for name, _ in chosen:
+                if name in skipped:
+                    found.append(begun.get(name, []))
+                    continue
+                best = (each.alignment_score for group in found for each in group)
+                found.append(
+                    search(
+                        search_model(prior.load(name)),
+                        observed,
+                        verifier,
+                        config.features,
+                        hypotheses.search,
+                        child_seed(seed, object_id),
+                        max(best, default=-np.inf),
+                    )
                 )
-            )
-        placed = [each for group in found for each in group]
-        shares = [p for (_, p), group in zip(chosen, found, strict=True) for _ in group]
-        ratios = log_likelihoods(placed, frame, object_id, plane, noise, hypotheses)
-        weights = weigh(shares, ratios, missing, hypotheses.weigh)
+            return found
+
+        def weighed(found: list[list[Hypothesis]]) -> tuple[list[Hypothesis], list[float], Array]:
+            placed = [each for group in found for each in group]
+            shares = [p for (_, p), group in zip(chosen, found, strict=True) for _ in group]
+            alone = log_likelihoods(placed, frame, object_id, plane, noise, hypotheses)
+            joint = alone
+            if views and max(alone, default=-np.inf) > -views.config.against:
+                placed, joint = _in_all_views(
+                    placed, alone, observation, verifier, wave, noise, hypotheses, views
+                )
+            return placed, alone, weigh(shares, joint, missing, hypotheses.weigh)
+
+        found = searched(frozenset(begun) | lost | views.hopeless())
+        placed, alone, weights = weighed(found)
+        if begun and _heaviest(found, weights) < views.config.sure:
+            # What started from the last frame is not sure: it is searched for as ever.
+            found = searched(views.hopeless())
+            placed, alone, weights = weighed(found)
         like: list[KinHypothesis] = []
         if weights[-1] >= hypotheses.kin.least_unknown:
             like = kin_hypotheses(
-                observation.points, frame, object_id, plane, prior, hypotheses, seed
+                observation.points,
+                frame,
+                object_id,
+                plane,
+                prior,
+                hypotheses,
+                seed,
+                views.points(),
+                views.depths(),
             )
     with timed(seconds, "inference"):
         shared = _shared_with_kin(weights, like)
         kept = _kept(shared, hypotheses.map)
         for i in kept[kept < len(placed)]:
-            placed[i] = _refined(placed[i], verifier, wave, hypotheses)
+            placed[i] = _refined(placed[i], verifier, wave, hypotheses, views)
         shapes = [
-            _placed_shape(placed[i], observation.points, wave, hypotheses)
+            _placed_shape(placed[i], observation.points, wave, hypotheses, views)
             if i < len(placed)
             else like[i - len(placed)].shape
             for i in kept
             if i < len(placed) + len(like)
         ]
-        posterior = _infer(
+        posterior, guess = _infer(
             observation,
             frame,
             plane,
@@ -112,8 +171,27 @@ def reconstruct_by_hypotheses(
             shapes,
             shared[kept] / shared[kept].sum(),
             hypotheses,
+            views,
             seed=seed,
             device=device,
+        )
+    memory = None
+    if earlier is not None:
+        memory = remember(
+            frame,
+            plane,
+            noise,
+            wave,
+            observation,
+            verifier.points,
+            seen_now,
+            [(each, float(weight)) for each, weight in zip(placed, weights, strict=False)],
+            best_ratios(placed, alone),
+            guess,
+            not views,
+            views.config.samples,
+            child_rng(seed, "remembered", object_id),
+            hypotheses,
         )
     ends = np.cumsum([0, *(len(group) for group in found)])
     return ObjectReconstruction(
@@ -133,6 +211,7 @@ def reconstruct_by_hypotheses(
         unknown_weight=float(weights[-1]),
         posterior=posterior,
         seconds=seconds,
+        memory=memory,
     )
 
 
@@ -144,17 +223,19 @@ def _infer(
     shapes: list[PlacedShape],
     weights: Array,
     config: HypothesesConfig,
+    views: EarlierViews,
     *,
     seed: int,
     device: str,
-) -> HypothesisPosterior:
-    """weights : of the shapes and, where there is one more, of the completion."""
-    part = None
+) -> tuple[HypothesisPosterior, Guess | None]:
+    """weights : of the shapes and, where there is one more, of the completion. Also what the
+    completion's network thinks of this view alone."""
+    part, guess = None, None
     if len(shapes) < len(weights):
         part = visible_part(
             observation.points, frame, observation.object_id, plane, config.completion
         )
-    extents: list[Array] = [observation.points.astype(np.float64)]
+    extents: list[Array] = [observation.points.astype(np.float64), *views.points()]
     extents += [shape.bounds for shape in shapes]
     extents += [] if part is None else [part.extent]
     extent = np.concatenate(extents)
@@ -162,17 +243,19 @@ def _infer(
     box = np.stack([extent.min(axis=0) - margin, extent.max(axis=0) + margin])
     means: list[MeanFunction] = list(shapes)
     if part is not None:
-        means.append(_completed(part, box, frame, observation.object_id, plane, config.mean))
+        completed, guess = _completed(part, box, plane, config.mean, views)
+        means.append(completed)
     stiffness = np.ones(len(means))
     stiffness[: len(shapes)] = config.map.stiffness
-    samples = soft_samples(observation, frame, config.map.behind, config.sensor)
+    samples = views.joined(soft_samples(observation, frame, config.map.behind, config.sensor))
     noise = config.sensor.sure * depth_deviation(observation.center[2:], config.sensor)[0]
-    return infer_correction(
+    posterior = infer_correction(
         Problem(samples, tuple(means), weights, stiffness, noise, box, wave),
         config.map,
         seed=child_seed(seed, observation.object_id),
         device=device,
     )
+    return posterior, guess
 
 
 def _shared_with_kin(weights: Array, like: list[KinHypothesis]) -> Array:
@@ -180,6 +263,54 @@ def _shared_with_kin(weights: Array, like: list[KinHypothesis]) -> Array:
     none = weights[-1]
     shares = [none * each.share for each in like]
     return np.array([*weights[:-1], *shares, none - sum(shares)])
+
+
+def _in_all_views(
+    placed: list[Hypothesis],
+    alone: list[float],
+    observation: ObjectObservation,
+    verifier: Verifier,
+    wave: float,
+    noise: PixelNoise,
+    config: HypothesesConfig,
+    views: EarlierViews,
+) -> tuple[list[Hypothesis], list[float]]:
+    """Placements fitted to the rays of all views, and their log likelihood ratios in all of them:
+    of those whose ratio in this frame, `alone`, comes near the best."""
+    sensor = config.sensor
+    seen = see(
+        verifier.frame,
+        observation.object_id,
+        verifier.plane,
+        noise,
+        sensor.patch,
+        sensor.bleed,
+        config.likelihood,
+    )
+    every = [SeenFrom(seen, np.eye(4)), *views.seen()]
+    votes = views.votes(observation.center)
+    near = [ratio > max(alone) - views.config.worth for ratio in alone]
+    placed = [
+        _refined(each, verifier, wave, config, views) if asked else each
+        for each, asked in zip(placed, near, strict=True)
+    ]
+    asked_ratios = [
+        joint_log_likelihood(each, every, votes, config) if asked else -np.inf
+        for each, asked in zip(placed, near, strict=True)
+    ]
+    # The others stay as far behind as they were.
+    gained = max(asked_ratios) - max(alone)
+    joint = [
+        ratio if asked else before + gained
+        for ratio, before, asked in zip(asked_ratios, alone, near, strict=True)
+    ]
+    return placed, joint
+
+
+def _heaviest(found: list[list[Hypothesis]], weights: Array) -> float:
+    """Weight of the heaviest stored object, of all of its placements."""
+    ends = np.cumsum([0, *(len(group) for group in found)])
+    return max((float(weights[a:b].sum()) for a, b in pairwise(ends)), default=0.0)
 
 
 def _kept(weights: Array, config: FittedMapConfig) -> NDArray[np.int64]:
@@ -190,7 +321,11 @@ def _kept(weights: Array, config: FittedMapConfig) -> NDArray[np.int64]:
 
 
 def _refined(
-    hypothesis: Hypothesis, verifier: Verifier, wave: float, config: HypothesesConfig
+    hypothesis: Hypothesis,
+    verifier: Verifier,
+    wave: float,
+    config: HypothesesConfig,
+    views: EarlierViews,
 ) -> Hypothesis:
     """Placed by the rays of what was seen, in the end; its score stays."""
     T_cam_object = refine_by_rays(
@@ -202,6 +337,7 @@ def _refined(
         wave,
         config.sensor,
         config.refine,
+        views.rays(),
     )
     T_cam_model = T_cam_object @ np.linalg.inv(hypothesis.model.T_model_object)
     return replace(hypothesis, T_cam_model=T_cam_model)
@@ -212,12 +348,13 @@ def _placed_shape(
     observed: NDArray[np.float32],
     wave: float,
     config: HypothesesConfig,
+    views: EarlierViews = ALONE,
 ) -> PlacedShape:
     """The less the frame says for the placement, and the less it fixes its pose, the softer its
     surface."""
     stored, mean = hypothesis.model.stored, config.mean
     covariance = pose_covariance(
-        hypothesis.T_cam_model, hypothesis.model, observed, wave, config.sensor
+        hypothesis.T_cam_model, hypothesis.model, observed, wave, config.sensor, views.points()
     )
     doubt = mean.doubt * max(0.0, mean.sure - hypothesis.alignment_score)
     shape = PlacedShape(
@@ -230,15 +367,24 @@ def _placed_shape(
 def _completed(
     part: VisiblePart,
     box: Array,
-    frame: Frame,
-    object_id: int,
     plane: Plane | None,
     config: MeanConfig,
-) -> MeanGrid:
+    views: EarlierViews,
+) -> tuple[MeanGrid, Guess]:
+    """From all views, and what the network thinks of the present one."""
     lower, spacing, nodes = grid_over(box, config.nodes)
-    empty = empty_space(nodes.reshape(-1, 3), frame, object_id, plane, config)
-    logits = completed_grid(nodes, empty.reshape(nodes.shape[:3]), part, config)
-    return MeanGrid(lower, spacing, logits, outside=-config.limit)
+    points = nodes.reshape(-1, 3)
+    empty = empty_space(points, part.frame, part.object_id, plane, config)
+    empty = (empty | views.empty(points, config)).reshape(nodes.shape[:3])
+    alone = network_grid(nodes, empty, part, config)
+    shell, left = shell_of(nodes, config), nodes[~empty]
+    crust = crust_of(left, part.frame, part.object_id, shell, config)
+    crust |= views.crust(left, shell, config)
+    every = alone.copy()
+    every[~empty] = views.averaged(alone[~empty], left)
+    logits = with_crust(every, empty, crust, config)
+    guess = Guess(lower, spacing, np.where(empty, np.nan, alone).astype(np.float16))
+    return MeanGrid(lower, spacing, logits, outside=-config.limit), guess
 
 
 def _shuffled(points: NDArray[np.float32], seed: int, object_id: int) -> Array:

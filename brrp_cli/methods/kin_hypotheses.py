@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,7 +12,7 @@ from scipy.special import expit
 from brrp_cli.config import HypothesesConfig, KinConfig
 from brrp_cli.frames.frame import Frame
 from brrp_cli.inference.placed_shape import PlacedShape
-from brrp_cli.kin.evidence import Evidence, gather
+from brrp_cli.kin.evidence import Evidence, OtherDepth, gather
 from brrp_cli.kin.fit import Fits, fit_kin
 from brrp_cli.kin.kept_library import kin_library
 from brrp_cli.kin.library import Library
@@ -43,17 +44,20 @@ def kin_hypotheses(
     prior: Prior,
     config: HypothesesConfig,
     seed: int,
+    others: Sequence[NDArray[np.floating]] = (),
+    depths: Sequence[OtherDepth] = (),
 ) -> list[KinHypothesis]:
     """The best fits that differ, whose shares leave to the completion what speaks against them.
 
     points : (n, 3) observed, metres, camera frame. None where shapes have no plane to stand on, and
-    where no fit is convincing.
+    where no fit is convincing. others : the same of other views of it, and `depths` of
+    these
     """
     kin = config.kin
     if plane is None or not kin.enabled:
         return []
     rng = child_rng(seed, "kin", object_id)
-    evidence = gather(points, frame, object_id, plane, kin, config.sensor, rng)
+    evidence = gather(points, frame, object_id, plane, kin, config.sensor, rng, others, depths)
     if len(evidence.seen) < kin.least_seen:
         return []
     library = kin_library(prior, kin)

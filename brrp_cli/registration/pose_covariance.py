@@ -3,6 +3,8 @@ approximation)."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -20,6 +22,7 @@ def pose_covariance(
     observed: NDArray[np.floating],
     wave: float,
     config: SensorConfig,
+    others: Sequence[NDArray[np.floating]] = (),
 ) -> Array:
     """Covariance (6, 6) of a small motion (turn about the model's middle, radians; shift, metres),
     in the camera's axes.
@@ -28,8 +31,14 @@ def pose_covariance(
     errors of their own, with a standard deviation of `wave` metres: as many pixels as a patch has,
     they are one vote. A motion of `config.pose_turn` and `config.pose_shift` is likely before
     anything was seen.
+    others : the same of other views, in this camera's frame: they err independently of this one
     """
-    patches = grid_subsample(np.asarray(observed, dtype=np.float32), config.patch)
+    patches = np.concatenate(
+        [
+            grid_subsample(np.asarray(each, dtype=np.float32), config.patch)
+            for each in (observed, *others)
+        ]
+    )
     local = transform_points(np.linalg.inv(T_cam_model), patches.astype(np.float64))
     distance, gradient = model.distance_and_gradient(local.T.astype(np.float32))
     scale = np.cbrt(np.linalg.det(T_cam_model[:3, :3]))

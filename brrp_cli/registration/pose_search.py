@@ -90,6 +90,28 @@ def search(
     return _distinct(sorted(found, key=lambda each: -each.alignment_score), config)
 
 
+def start_from(
+    T_cam_model: Array, scale: Array, model: Model, verifier: Verifier, config: SearchConfig
+) -> list[Hypothesis]:
+    """Placements (B, 4, 4) that were found in an earlier frame, and `scale` (B,) of each: as they
+    were and refined to this frame, those that differ, best first."""
+    moved = _refined(
+        T_cam_model, model, verifier, config.fine_points, config.fine_distance, config.fine_steps
+    )
+    log = np.log(scale)
+    resized = np.abs(log) > config.least_size_change
+    cost = np.where(resized, config.size_cost + config.size_spread_cost * log**2, 0.0)
+    found = _judged(
+        np.concatenate([T_cam_model, moved]),
+        model,
+        verifier,
+        config,
+        np.tile(scale, 2),
+        np.tile(cost, 2),
+    )
+    return _distinct(found, config)
+
+
 def by_colour(
     found: list[Hypothesis], verifier: Verifier, config: SearchConfig
 ) -> list[Hypothesis]:

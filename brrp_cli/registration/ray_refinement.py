@@ -8,6 +8,9 @@ faces the camera pulls.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
@@ -31,6 +34,7 @@ def refine_by_rays(
     wave: float,
     sensor: SensorConfig,
     config: RayRefinementConfig,
+    others: Sequence[OtherRays] = (),
 ) -> Array:
     """T_cam_shape (4, 4), a similarity, followed by the small rigid motion under which the rays of
     the observed points (n, 3), metres, camera frame, in random order, meet the shape where depth
@@ -38,14 +42,16 @@ def refine_by_rays(
 
     focal_length : pixels, of the pixel's width; plane : what the object may stand on; wave :
     metres, standard deviation of the mean depth of a patch (observation/sensor_noise.py)
+    others : what other views measured, each from a camera of its own
     """
     points = np.asarray(observed[: config.points], dtype=np.float64)
     middle = transform_points(T_cam_shape, shape.vertices.mean(axis=0, keepdims=True))[0]
     T = T_cam_shape.copy()
     for _ in range(config.steps):
-        rows, residuals, deviations = _ray_rows(
-            T, shape, points, middle, focal_length, wave, sensor
-        )
+        parts = [_ray_rows(T, shape, points, middle, focal_length, wave, sensor)]
+        parts += [_other_rows(T, shape, other, middle, sensor, config) for other in others]
+        rows, residuals, deviations = (np.concatenate(each) for each in zip(*parts, strict=True))
+        rays = len(rows)
         if plane is not None:
             standing = _standing_row(T, shape, plane, middle, config)
             rows = np.concatenate([rows, standing[0]])
@@ -54,7 +60,7 @@ def refine_by_rays(
         # Tukey's biweight: what belongs to something else does not pull at all.
         share = np.clip(1 - (residuals / (config.outlier * deviations)) ** 2, 0, None) ** 2
         weight = share / deviations**2
-        weight[: len(points)] *= config.independent
+        weight[:rays] *= config.independent
         normal = (rows * weight[:, None]).T @ rows
         normal += np.diag([config.turn**-2] * 3 + [config.shift**-2] * 3)
         step = np.linalg.solve(normal, rows.T @ (weight * residuals))
@@ -62,6 +68,42 @@ def refine_by_rays(
         if np.abs(step).max() < config.still:
             break
     return T if _small(T, T_cam_shape, middle, config) else T_cam_shape
+
+
+@dataclass(frozen=True)
+class OtherRays:
+    """Another view of an object at rest: points (n, 3), metres, in its own camera frame, in random
+    order; focal_length, wave : of it, as in `refine_by_rays`; T_view_cam : (4, 4) rigid, from this
+    frame's camera to that one's"""
+
+    points: NDArray[np.floating]
+    focal_length: float
+    wave: float
+    T_view_cam: Array
+
+
+def _other_rows(
+    T: Array,
+    shape: StoredShape,
+    view: OtherRays,
+    middle: Array,
+    sensor: SensorConfig,
+    config: RayRefinementConfig,
+) -> tuple[Array, Array, Array]:
+    """`_ray_rows` of another view, by turn and shift in this frame."""
+    points = np.asarray(view.points[: config.points], dtype=np.float64)
+    rows, residuals, deviations = _ray_rows(
+        view.T_view_cam @ T,
+        shape,
+        points,
+        np.asarray(transform_points(view.T_view_cam, middle), dtype=np.float64),
+        view.focal_length,
+        view.wave,
+        sensor,
+    )
+    R = view.T_view_cam[:3, :3]
+    # Row vectors: a product with R takes them from the view's axes to this frame's.
+    return np.concatenate([rows[:, :3] @ R, rows[:, 3:] @ R], axis=1), residuals, deviations
 
 
 def _ray_rows(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,10 +12,19 @@ from brrp_cli.config import HypothesesConfig, WeighConfig
 from brrp_cli.frames.frame import Frame
 from brrp_cli.observation.pixel_noise import PixelNoise
 from brrp_cli.observation.support_plane import Plane
-from brrp_cli.registration.likelihood import evidence, log_likelihood, see
+from brrp_cli.registration.likelihood import SeenObject, evidence, log_likelihood, see
 from brrp_cli.registration.pose_search import Hypothesis
 
 Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class SeenFrom:
+    """seen : the object in a frame; T_view_cam : (4, 4) rigid, from the present frame's camera to
+    that one's"""
+
+    seen: SeenObject
+    T_view_cam: Array
 
 
 def log_likelihoods(
@@ -38,6 +48,40 @@ def log_likelihoods(
             ratio = log_likelihood(found, likelihood) - likelihood.other_size * resized
         ratios.append(ratio)
     return ratios
+
+
+def joint_log_likelihood(
+    placed: Hypothesis, views: Sequence[SeenFrom], votes: float, config: HypothesesConfig
+) -> float:
+    """Of a placement, against that it is none of the stored objects, nats, in all views of it.
+
+    Ratios of views that err independently add up: the mean of all counts `votes` times.
+    """
+    likelihood = config.likelihood
+    ratios = [
+        log_likelihood(
+            evidence(
+                view.T_view_cam @ placed.T_cam_model,
+                placed.model,
+                view.seen,
+                likelihood,
+                config.search.colour,
+            ),
+            likelihood,
+        )
+        for view in views
+    ]
+    resized = abs(np.log(placed.scale)) > config.search.least_size_change
+    return votes * float(np.mean(ratios)) - likelihood.other_size * resized
+
+
+def best_ratios(placed: Sequence[Hypothesis], ratios: Sequence[float]) -> dict[str, float]:
+    """Name -> log likelihood ratio, nats, of the best placement of each object."""
+    best: dict[str, float] = {}
+    for each, ratio in zip(placed, ratios, strict=True):
+        name = each.model.stored.name
+        best[name] = max(float(ratio), best.get(name, -np.inf))
+    return best
 
 
 def weigh(

@@ -7,11 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import trimesh
-from table_scene import box, in_camera, photograph, placed
+from table_scene import T_CAM_WORLD, T_WORLD_CAM, box, in_camera, photograph, placed
 
-from brrp_cli import open_posterior, open_prior, reconstruct, write_results
+from brrp_cli import Reconstructor, open_posterior, open_prior, reconstruct, write_results
 from brrp_cli.config import preset
-from brrp_cli.geometry import transform_points
+from brrp_cli.demo.layout import turn
+from brrp_cli.geometry import similarity, transform_points
+from brrp_cli.ground_truth.surface_metrics import MeshSurface
 from brrp_cli.prior.build.build import build_prior
 from brrp_cli.prior.parameters import BuildParameters
 from brrp_cli.raycast import inside
@@ -156,3 +158,57 @@ def test_the_number_of_threads_changes_no_byte(folder, truth, result):
     for one, other in zip(result.objects, again.objects, strict=True):
         assert one.surface.vertices.tobytes() == other.surface.vertices.tobytes()
         assert one.surface.uncertainty.tobytes() == other.surface.uncertainty.tobytes()
+
+
+def seen_from(mesh, turned):
+    """A frame of a mesh, in the first camera's frame, from a camera that has gone round the table;
+    the same as a table that has turned."""
+    around = similarity(rotation=turn(turned))
+    T = T_CAM_WORLD @ around @ T_WORLD_CAM
+    frame = photograph({STRANGE: in_camera(mesh, T)})
+    return replace(frame, T_world_cam=np.linalg.inv(around) @ T_WORLD_CAM), T
+
+
+@pytest.mark.slow
+def test_the_first_frame_of_a_stream_is_as_a_frame_alone(result, folder, truth):
+    again = Reconstructor(folder, track=True)(photograph(truth))
+    for a, b in zip(result.objects, again.objects, strict=True):
+        assert a.surface.vertices.tobytes() == b.surface.vertices.tobytes()
+        assert a.surface.uncertainty.tobytes() == b.surface.uncertainty.tobytes()
+        assert b.memory is None
+
+
+@pytest.mark.slow
+def test_the_view_of_the_other_side_halves_the_error_of_what_was_not_seen(folder):
+    """Of a bar that the prior does not hold: the second view knows what the first one saw."""
+    strange = in_camera(solids.box(0.20, 0.05, 0.05), placed(0.0, 0.0, 1.3))
+    frames = [seen_from(strange, turned) for turned in (0.0, np.pi)]
+    session = Reconstructor(folder, track=True)
+    session(frames[0][0])
+    both = session(frames[1][0]).objects[0]
+    alone = Reconstructor(folder)(frames[1][0]).objects[0]
+    # What the second camera alone does not see.
+    mesh = in_camera(strange, frames[1][1])
+    points, faces = trimesh.sample.sample_surface(mesh, 4000, seed=0)
+    hidden = points[np.einsum("ij,ij->i", mesh.face_normals[faces], points) > 0]
+    errors = [
+        MeshSurface(item.surface.as_trimesh()).nearest(hidden).distance.mean()
+        for item in (alone, both)
+    ]
+    assert errors[1] < errors[0] / 2
+    assert both.mean_uncertainty < alone.mean_uncertainty
+
+
+@pytest.mark.slow
+def test_a_stored_object_starts_from_where_it_was_and_is_found_again_where_it_was_pushed(folder):
+    session, other = (Reconstructor(folder, track=True, workers=n) for n in (1, 2))
+    for number, (turned, x) in enumerate([(0.0, 0.09), (0.4, 0.09), (0.6, 0.03)]):
+        mesh = in_camera(can(), placed(x, -0.04, 0.0))
+        frame, T = seen_from(mesh, turned)
+        item, again = session(frame).objects[0], other(frame).objects[0]
+        assert item.surface.vertices.tobytes() == again.surface.vertices.tobytes()
+        assert item.surface.uncertainty.tobytes() == again.surface.uncertainty.tobytes()
+        assert item.recognised.name == "can"
+        assert iou(item.surface, in_camera(mesh, T)) > 0.95
+        memory = session._seen[item.object_id]
+        assert len(memory) == (1, 2, 1)[number], "what was pushed is forgotten where it was"
