@@ -32,9 +32,11 @@ AHEAD = 2
 RETRIES = 3
 # How long a worker of a local cluster may take to start again before another takes its place.
 RESTART = "60s"
-# Seconds: until a scheduler must have answered, between looks at how many workers there are, and
-# until it is said that there are none.
-CONNECT, LOOK, NO_WORKERS = 10.0, 2.0, 20.0
+# Seconds: until a scheduler must have answered, between looks at how many workers there are, until
+# it is said that there are none, and for a result, which is small, to come from its worker.
+CONNECT, LOOK, NO_WORKERS, FETCH = 10.0, 2.0, 20.0, 20.0
+# In place of a result whose worker died before it could be had.
+NOT_YET = object()
 
 _LOCAL = re.compile(r"local:([1-9]\d{0,3})")
 _TOKEN = ".brrp-shared-"
@@ -123,6 +125,9 @@ class Cluster:
                     index = running.pop(future)
                     with self._lost():
                         result = _result(future, job.time_limit)
+                        if result is NOT_YET:
+                            running[future] = index
+                            continue
                         future.release()
                     if isinstance(result, ClusterError):
                         raise result
@@ -209,13 +214,21 @@ def _ended(running: dict[Any, int]) -> list[Any]:
 
 
 def _result(future: Any, time_limit: float) -> Any:
-    """What the task gave; a BrrpError if workers died of it. Errors: CancelledError for a future of
-    a scheduler that is gone."""
+    """What the task gave; a BrrpError if workers died of it; NOT_YET where its worker died before
+    the result could be had, so that another one does the task again. Errors: CancelledError for a
+    future of a scheduler that is gone."""
+    from distributed import TimeoutError
     from distributed.scheduler import KilledWorker
 
-    if future.status != "error":
-        return future.result()
-    error = future.exception()
+    try:
+        if future.status != "error":
+            # Without a limit it would wait for workers that nobody revives meanwhile.
+            return future.result(timeout=FETCH)
+        error = future.exception(timeout=FETCH)
+    except TimeoutError:
+        return NOT_YET
+    except KilledWorker as killed:
+        error = killed
     if isinstance(error, KilledWorker):
         return BrrpError(
             "The worker process died",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import multiprocessing
 import os
 import signal
 import sys
@@ -55,6 +56,29 @@ def act(what: str, folder: Path) -> Any:
     if what == "surroundings":
         return os.environ["OMP_NUM_THREADS"], Path.cwd()
     return what.upper()
+
+
+def test_a_worker_that_dies_with_its_result_is_replaced_and_the_task_is_done_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Between the news of its end and its result."""
+    ended, killed = cluster._ended, []
+
+    def then_killed(running: dict[Any, int]) -> list[Any]:
+        found = ended(running)
+        if found and not killed:
+            worker = multiprocessing.active_children()[0]
+            worker.kill()
+            worker.join()
+            killed.append(worker)
+        return found
+
+    monkeypatch.setattr(cluster, "_ended", then_killed)
+    monkeypatch.setattr(cluster, "RESTART", "0.1s")
+    monkeypatch.setattr(cluster, "FETCH", 1.0)
+    with open_executor(scheduler="local:1") as executor:
+        assert dict(executor.run(act, [("a", tmp_path)], 60.0)) == {0: "A"}
+    assert killed
 
 
 def test_each_task_ends_alone_whatever_becomes_of_workers(address: str, tmp_path: Path) -> None:
