@@ -61,7 +61,6 @@ __all__ = [
 class HypothesesConfig:
     """What takes the place of the scale scan and of the fixed grid of hinge points."""
 
-    strays: StrayConfig = field(default_factory=StrayConfig)
     search: SearchConfig = field(default_factory=SearchConfig)
     refine: RayRefinementConfig = field(default_factory=RayRefinementConfig)
     likelihood: LikelihoodConfig = field(default_factory=LikelihoodConfig)
@@ -77,12 +76,14 @@ class HypothesesConfig:
 class Config:
     """The whole method. `preset` names where the values came from.
 
+    strays : what retrieval by appearance leaves out of each mask, and `hypotheses` too
     hypotheses : None is the paper's way, `registration` and `inference`, which mean nothing
     otherwise
     """
 
     preset: str = "default"
     k: int = 3
+    strays: StrayConfig = field(default_factory=StrayConfig)
     features: FeatureConfig = field(default_factory=FeatureConfig)
     registration: RegistrationConfig = field(default_factory=RegistrationConfig)
     observation: ObservationConfig = field(default_factory=ObservationConfig)

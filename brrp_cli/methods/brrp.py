@@ -42,7 +42,7 @@ def run(frame: Frame, setup: Setup) -> Reconstruction:
     start = time.perf_counter()
     given = frame
     if config.hypotheses is not None:
-        frame = without_strays(frame, config.hypotheses.strays)
+        frame = without_strays(frame, config.strays)
     scene = observe(frame, config.observation, seed, workers)
     if config.hypotheses is not None:
         wave = wave_deviation(frame, scene.plane, config.hypotheses.sensor)

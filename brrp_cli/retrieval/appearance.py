@@ -20,6 +20,7 @@ from brrp_cli.config.retrieval import FusionConfig
 from brrp_cli.errors import RetrievalError
 from brrp_cli.frames.frame import BACKGROUND, Frame
 from brrp_cli.observation.ray_samples import box_center
+from brrp_cli.observation.strays import without_strays
 from brrp_cli.observation.support_plane import Plane, fit_plane
 from brrp_cli.prior.store import Prior
 from brrp_cli.retrieval.aligned import Aligner
@@ -77,6 +78,8 @@ class AppearanceRetriever:
 
     def evidence(self, frame: Frame) -> dict[int, Similarity]:
         """How alike every object of the frame is to the stored ones, by id."""
+        # Methods that leave strays out, and those that do not, get the same answer.
+        frame = without_strays(frame, self._config.strays)
         plane, own = self.plane(frame), self._config.retrieval
         looks, points = {}, {}
         for object_id in frame.object_ids:

@@ -6,6 +6,7 @@ from painted_scene import STRANGE, THINGS, photograph, write_things
 
 from brrp_cli.config import FeatureConfig, preset
 from brrp_cli.errors import RetrievalError
+from brrp_cli.observation.strays import without_strays
 from brrp_cli.prior.build.build import build_prior
 from brrp_cli.prior.parameters import BuildParameters
 from brrp_cli.prior.store import open_prior
@@ -141,6 +142,20 @@ def test_answers_are_those_of_the_frame_that_is_asked_about(prior, retriever):
     other = dataclasses.replace(frame, segmap=swapped)
     np.testing.assert_allclose(retriever.probabilities(other, 4), first)
     np.testing.assert_array_equal(retriever.probabilities(frame, 3), first)
+
+
+def test_a_pixel_far_behind_its_object_changes_nothing_else(prior, retriever):
+    """As methods see the frame that leave such pixels out, and those that do not."""
+    frame, _ = scene()
+    pixel = tuple(np.argwhere(frame.segmap == 3)[0])
+    points = frame.points.copy()
+    points[pixel] *= 4.0
+    with_stray = dataclasses.replace(frame, points=points)
+    without = without_strays(with_stray, preset("default").strays)
+    assert without is not with_stray
+    for object_id in frame.object_ids:
+        first = retriever.probabilities(with_stray, object_id)
+        np.testing.assert_array_equal(retriever.probabilities(without, object_id), first)
 
 
 def test_an_object_that_is_not_there_is_refused(retriever):

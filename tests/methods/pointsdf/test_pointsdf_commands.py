@@ -45,6 +45,17 @@ def test_reconstruct_writes_what_the_other_methods_write(out):
         assert mesh.is_watertight and mesh.volume > 0
 
 
+@pytest.mark.slow
+def test_meshes_have_the_volume_of_what_was_learnt_by_heart(learnt, tmp_path):
+    options = ("--method", "pointsdf", "--weights", learnt.weights, "-o", tmp_path / "out")
+    result = run("reconstruct", learnt.folder / "scenes" / "0.npz", *options)
+    assert result.exit_code == 0, result.output
+    for i, name in enumerate(MESHES):
+        mesh = trimesh.load(tmp_path / "out" / f"object_{i + 1}.ply")
+        # Grown by the level: occupancy is 0.3 a little outside of where it is 0.5.
+        assert 0.6 < mesh.volume / MESHES[name].volume < 1.7, name
+
+
 def test_the_record_says_what_was_trained(out, trained):
     record = json.loads((out[0] / "result.json").read_text())
     assert record["method"] == "pointsdf" and record["prior"] is None
