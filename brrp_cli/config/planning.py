@@ -18,8 +18,8 @@ class RestConfig:
 
     Steps, each so many seconds long
     apart : overlaps push apart, without weight, turning or friction; drop : down to what carries
-    it, without turning, at most, until nothing is faster than `lands`, metres per second; lean :
-    with turning; free : without damping; left_alone : the check
+    it, without turning, at most, until nothing is faster than `lands`, metres per second, at one
+    of every `look` steps; lean : with turning; free : without damping; left_alone : the check
     apart_time : `contact_time` of `apart`, longer than `slow`, so that nothing is thrown
     slow : of `apart` and `drop`, gentle : of `lean`: a body loses its speed in this time
 
@@ -39,6 +39,7 @@ class RestConfig:
     apart_time: float = 0.02
     drop: float = 5.0
     lands: float = 0.001
+    look: int = 50
     lean: float = 1.0
     free: float = 1.0
     left_alone: float = 3.0

@@ -32,8 +32,6 @@ from brrp_cli.planning.body import Body, lift_onto
 from brrp_cli.planning.mjcf import Files, Table, scene_mjcf
 from brrp_cli.planning.parts import hull_corners
 
-# Steps after which it is looked whether anything moves still.
-LOOK = 50
 Array = NDArray[np.float64]
 Poses = dict[str, Array]
 
@@ -227,7 +225,7 @@ class _World:
         moving = self._moving()
         for step in range(1, round(seconds / model.opt.timestep) + 1):
             self.mj.mj_step(model, data)
-            if step % LOOK == 0 and np.abs(data.qvel[moving]).max() < until:
+            if step % self.config.look == 0 and np.abs(data.qvel[moving]).max() < until:
                 break
         self.mj.mj_forward(model, data)
 

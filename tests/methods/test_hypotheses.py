@@ -10,7 +10,8 @@ from table_scene import placed, stored
 
 from brrp_cli.config import FittedMapConfig, HypothesesConfig
 from brrp_cli.geometry import similarity
-from brrp_cli.methods.brrp_default import _kept, _placed_shape
+from brrp_cli.methods.brrp_default import _kept
+from brrp_cli.methods.infer_object import placed_shape
 from brrp_cli.registration.model import search_model
 from brrp_cli.registration.pose_search import Hypothesis
 
@@ -23,16 +24,16 @@ def hypothesis(score, size=1.0):
     return Hypothesis(search_model(stored("box")), T @ similarity(size), size, score)
 
 
-def placed_shape(score, size=1.0):
+def shape_at(score, size=1.0):
     """Seen from all sides by a sensor with waves of half a millimetre."""
     one = hypothesis(score, size)
     seen = one.model.surface @ one.T_cam_model[:3, :3].T + one.T_cam_model[:3, 3]
-    return _placed_shape(one, seen.astype(np.float32), 0.0005, CONFIG)
+    return placed_shape(one, seen.astype(np.float32), 0.0005, CONFIG)
 
 
 @pytest.mark.parametrize("size", [1.0, 0.8])
 def test_a_placed_shape_lies_where_the_hypothesis_puts_the_model(size):
-    shape = placed_shape(0.95, size)
+    shape = shape_at(0.95, size)
     assert shape.name == "box" and shape.unit == pytest.approx(0.07 * size, rel=1e-5)
     local = np.linalg.inv(T)
     vertices = shape.vertices @ local[:3, :3].T + local[:3, 3]
@@ -44,13 +45,13 @@ def test_a_placed_shape_lies_where_the_hypothesis_puts_the_model(size):
 
 
 def test_less_evidence_makes_a_softer_surface():
-    widths = [placed_shape(score).width for score in (0.85, 0.6, 0.2, -1.0)]
+    widths = [shape_at(score).width for score in (0.85, 0.6, 0.2, -1.0)]
     for sharp, soft in pairwise(widths):
         assert sharp < soft
-    sure = placed_shape(MEAN.sure).width
-    assert sure >= MEAN.width and placed_shape(1.0).width == sure
+    sure = shape_at(MEAN.sure).width
+    assert sure >= MEAN.width and shape_at(1.0).width == sure
     # Half a unit below `sure` adds half of `doubt`.
-    assert placed_shape(MEAN.sure - 0.5).width == pytest.approx(sure + MEAN.doubt / 2)
+    assert shape_at(MEAN.sure - 0.5).width == pytest.approx(sure + MEAN.doubt / 2)
 
 
 def test_hypotheses_that_weigh_next_to_nothing_are_left_out():

@@ -1,0 +1,125 @@
+"""The posterior of one object from its weighed hypotheses: placed shapes, and the completion."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brrp_cli.completion.completed_mean import (
+    crust_of,
+    empty_space,
+    network_grid,
+    shell_of,
+    with_crust,
+)
+from brrp_cli.completion.visible_part import VisiblePart, visible_part
+from brrp_cli.config import HypothesesConfig, MeanConfig
+from brrp_cli.frames.frame import Frame
+from brrp_cli.inference.hypothesis_posterior import HypothesisPosterior, MeanFunction
+from brrp_cli.inference.infer_hypotheses import Problem, infer_correction
+from brrp_cli.inference.mean_grid import MeanGrid, grid_over
+from brrp_cli.inference.placed_shape import PlacedShape
+from brrp_cli.inference.posterior import LOGISTIC_DEVIATION
+from brrp_cli.methods.earlier_views import ALONE, EarlierViews, Guess
+from brrp_cli.observation.ray_samples import ObjectObservation
+from brrp_cli.observation.sensor_noise import depth_deviation
+from brrp_cli.observation.soft_samples import soft_samples
+from brrp_cli.observation.support_plane import Plane
+from brrp_cli.registration.pose_covariance import pose_covariance
+from brrp_cli.registration.pose_search import Hypothesis
+from brrp_cli.seeds import child_seed
+
+Array = NDArray[np.float64]
+
+
+def infer_object(
+    observation: ObjectObservation,
+    frame: Frame,
+    plane: Plane | None,
+    wave: float,
+    shapes: list[PlacedShape],
+    weights: Array,
+    config: HypothesesConfig,
+    views: EarlierViews,
+    *,
+    seed: int,
+    device: str,
+) -> tuple[HypothesisPosterior, Guess | None]:
+    """The posterior, camera frame, and what the completion's network thinks of this view alone;
+    None where the completion weighs nothing.
+
+    wave : metres, as in `reconstruct_by_hypotheses`; weights : (C,) of the shapes and, where there
+    is one more, of the completion; views : of earlier frames, none of a frame that stands alone
+    """
+    part, guess = None, None
+    if len(shapes) < len(weights):
+        part = visible_part(
+            observation.points, frame, observation.object_id, plane, config.completion
+        )
+    extents: list[Array] = [observation.points.astype(np.float64), *views.points()]
+    extents += [shape.bounds for shape in shapes]
+    extents += [] if part is None else [part.extent]
+    extent = np.concatenate(extents)
+    margin = config.map.margin
+    box = np.stack([extent.min(axis=0) - margin, extent.max(axis=0) + margin])
+    means: list[MeanFunction] = list(shapes)
+    if part is not None:
+        completed, guess = _completed(part, box, plane, config.mean, views)
+        means.append(completed)
+    stiffness = np.ones(len(means))
+    stiffness[: len(shapes)] = config.map.stiffness
+    samples = views.joined(soft_samples(observation, frame, config.map.behind, config.sensor))
+    noise = config.sensor.sure * depth_deviation(observation.center[2:], config.sensor)[0]
+    posterior = infer_correction(
+        Problem(samples, tuple(means), weights, stiffness, noise, box, wave),
+        config.map,
+        seed=child_seed(seed, observation.object_id),
+        device=device,
+    )
+    return posterior, guess
+
+
+def placed_shape(
+    hypothesis: Hypothesis,
+    observed: NDArray[np.float32],
+    wave: float,
+    config: HypothesesConfig,
+    views: EarlierViews = ALONE,
+) -> PlacedShape:
+    """The less the frame says for the placement, and the less it fixes its pose, the softer its
+    surface."""
+    stored, mean = hypothesis.model.stored, config.mean
+    covariance = pose_covariance(
+        hypothesis.T_cam_model, hypothesis.model, observed, wave, config.sensor, views.points()
+    )
+    doubt = mean.doubt * max(0.0, mean.sure - hypothesis.alignment_score)
+    shape = PlacedShape(
+        stored.name, stored.shape, hypothesis.T_cam_object, mean.width, mean.limit, covariance
+    )
+    by_pose = float(np.sqrt(np.mean(shape.deviations**2))) / LOGISTIC_DEVIATION
+    return replace(shape, width=float(np.hypot(mean.width, by_pose)) + doubt)
+
+
+def _completed(
+    part: VisiblePart,
+    box: Array,
+    plane: Plane | None,
+    config: MeanConfig,
+    views: EarlierViews,
+) -> tuple[MeanGrid, Guess]:
+    """From all views, and what the network thinks of the present one."""
+    lower, spacing, nodes = grid_over(box, config.nodes)
+    points = nodes.reshape(-1, 3)
+    empty = empty_space(points, part.frame, part.object_id, plane, config)
+    empty = (empty | views.empty(points, config)).reshape(nodes.shape[:3])
+    alone = network_grid(nodes, empty, part, config)
+    shell, left = shell_of(nodes, config), nodes[~empty]
+    crust = crust_of(left, part.frame, part.object_id, shell, config)
+    crust |= views.crust(left, shell, config)
+    every = alone.copy()
+    every[~empty] = views.averaged(alone[~empty], left)
+    logits = with_crust(every, empty, crust, config)
+    guess = Guess(lower, spacing, np.where(empty, np.nan, alone).astype(np.float16))
+    return MeanGrid(lower, spacing, logits, outside=-config.limit), guess
