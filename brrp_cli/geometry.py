@@ -30,6 +30,13 @@ def similarity(
     return T
 
 
+def as_transforms(rotations: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(K, 4, 4) matrices that turn about the origin by rotations (K, 3, 3)."""
+    T = np.tile(np.eye(4), (len(rotations), 1, 1))
+    T[:, :3, :3] = rotations
+    return T
+
+
 def backproject(depth: Array, K: Array) -> NDArray[np.float32]:
     """Depth (H, W), metres along z, to points (H, W, 3), metres, camera frame.
 

@@ -4,6 +4,7 @@
     python tools/benchmark.py --prior prior/ a.npz b.npz    # and other frames
     python tools/benchmark.py --quick                       # one repeat, one plain object
     python tools/benchmark.py --json history.jsonl --growth
+    python tools/benchmark.py --no-made --prior prior/ --set stereo=scenes/ --set real=frames/
 
 The made frame is that of `brrp demo`, its first four objects, with the starter prior. Every frame
 is first reconstructed once, then `--repeats` times: medians, least and greatest. Stages are those
@@ -12,6 +13,10 @@ of one thread; the whole is timed with one thread and with `--workers`. The plai
 `brrp reconstruct FRAME` as a process of its own, imports included. Denormal numbers, which some
 processors multiply 20 times more slowly and others at full speed, are counted by the folder of
 brrp_cli that made them. With --json a line is appended.
+
+A set is a folder of frames (*.npz) or of scenes, whose first views are taken: one row of a table
+over its frames. Frames without masks get them, and the time counts. `busy` is how many times as
+many CPU seconds one thread takes where the other cores are kept busy.
 """
 
 from __future__ import annotations
@@ -35,6 +40,7 @@ from speed.frames import four_objects
 from speed.growth import cases
 from speed.machine import Machine, limits, measure_machine
 from speed.measure import cold_reconstruct, peak_megabytes, run, spread
+from speed.sets import HEAD, frames_of, measure_set
 
 from brrp_cli.config import preset
 from brrp_cli.errors import BrrpError
@@ -71,6 +77,10 @@ class Options:
 @click.option("--plain-objects", type=click.IntRange(0), help="Of each frame. [default: all]")
 @click.option("--cold/--no-cold", default=True)
 @click.option("--growth", is_flag=True, help="With objects, pixels, particles, ...")
+@click.option("--set", "sets", multiple=True, metavar="NAME=FOLDER", help="A row of its own.")
+@click.option(
+    "--set-frames", default=6, show_default=True, type=click.IntRange(1), help="Of a set."
+)
 @click.option("--quick", is_flag=True, help="One repeat, one plain object, less growth.")
 @click.option("--json", "history", type=click.Path(path_type=Path), help="Append a line here.")
 def main(
@@ -82,6 +92,8 @@ def main(
     plain_objects: int | None,
     cold: bool,
     growth: bool,
+    sets: tuple[str, ...],
+    set_frames: int,
     quick: bool,
     history: Path | None,
 ) -> None:
@@ -92,8 +104,8 @@ def main(
     try:
         frames = {MADE: four_objects()} if made else {}
         frames |= {str(path): read_frame(path) for path in frame_paths}
-        if not frames:
-            raise click.UsageError("name a frame, or leave out --no-made")
+        if not frames and not sets:
+            raise click.UsageError("name a frame or a set, or leave out --no-made")
         prior = open_prior(_starter() if prior_path is None else prior_path)
         machine = measure_machine()
         click.echo(
@@ -108,7 +120,9 @@ def main(
             "workers": options.workers,
             "frames": [measure(n, f, prior, machine, options) for n, f in frames.items()],
         }
-        if growth:
+        if sets:
+            record["sets"] = measure_sets(sets, set_frames, prior, options)
+        if growth and frames:
             record["growth"] = measure_growth(next(iter(frames.values())), prior, options, quick)
     except BrrpError as error:
         raise click.ClickException(str(error)) from error
@@ -211,6 +225,28 @@ def _cold(frame: Frame, prior: Prior) -> dict[str, float]:
         f"{cold.megabytes:.0f} MB at most"
     )
     return asdict(cold)
+
+
+def measure_sets(
+    sets: tuple[str, ...], most: int, prior: Prior, options: Options
+) -> list[dict[str, Any]]:
+    """A row for each NAME=FOLDER; prints them and returns them for JSON."""
+    click.echo(f"\n{HEAD}")
+    rows = []
+    for name, _, folder in (each.partition("=") for each in sets):
+        if not folder:
+            raise click.UsageError(f"--set {name}: write NAME=FOLDER")
+        found = measure_set(
+            name,
+            frames_of(Path(folder), most),
+            prior,
+            options.workers,
+            options.repeats,
+            plain=options.plain_objects != 0,
+        )
+        click.echo(found.line())
+        rows.append(asdict(found))
+    return rows
 
 
 def measure_growth(frame: Frame, prior: Prior, options: Options, quick: bool) -> list[dict]:

@@ -21,6 +21,7 @@ from brrp_cli.config.registration import (
     RayRefinementConfig,
     RegistrationConfig,
     SearchConfig,
+    TurnConfig,
     VerificationConfig,
     WeighConfig,
 )
@@ -50,6 +51,7 @@ __all__ = [
     "SensorConfig",
     "StrayConfig",
     "SurfaceConfig",
+    "TurnConfig",
     "VPrismConfig",
     "VerificationConfig",
     "WeighConfig",

@@ -82,6 +82,34 @@ class ColourConfig:
 
 
 @dataclass(frozen=True)
+class TurnConfig:
+    """Placements of an object that looks almost alike when it is turned (registration/turned.py).
+
+    Tried are `turns` turns about each axis of its box, both ways up, and `any_turns` of any kind,
+    under which the mean distance of `surface_points` of its surface from itself is less than
+    `itself`, metres. The `count` best of them by `coarse_points` observed points, first those that
+    are `apart` radians from all better ones, are refined, and the best `judged` held against
+    `points` observed ones; distances beyond `far` metres count as that. One takes the place of the
+    first if it is better by `gain` standard errors. Those that are worse by no more than
+    `undecided` standard errors, and in alignment score by no more than `alike`, are as probable.
+    """
+
+    turns: int = 36
+    any_turns: int = 200
+    surface_points: int = 150
+    itself: float = 0.003
+    count: int = 16
+    judged: int = 8
+    apart: float = 0.25
+    coarse_points: int = 300
+    points: int = 2000
+    far: float = 0.005
+    gain: float = 2.0
+    undecided: float = 2.0
+    alike: float = 0.1
+
+
+@dataclass(frozen=True)
 class SearchConfig:
     """Hypotheses about one stored object's pose.
 
@@ -137,6 +165,7 @@ class SearchConfig:
     kept: int = 6
     alignment_score: VerificationConfig = field(default_factory=VerificationConfig)
     colour: ColourConfig = field(default_factory=ColourConfig)
+    turn: TurnConfig = field(default_factory=TurnConfig)
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ evaluated in the model's own frame: exact within the band where the logit is not
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
@@ -37,6 +37,8 @@ class PlacedShape:
     kin : whether the shape was stretched to fit an object that is not the stored one but like it
     exact : metres from the surface within which distances are, 0: nowhere; None: where the logit is
     not at its limit
+    alike : (K, 4, 4) T_cam_shape of other placements, turned about itself, that the frame does not
+    tell apart from this one
     """
 
     kind: ClassVar[str] = "shape"
@@ -49,6 +51,7 @@ class PlacedShape:
     covariance: Array
     kin: bool = False
     exact: float | None = None
+    alike: Array = field(default_factory=lambda: np.empty((0, 4, 4)))
 
     @property
     def taken_for(self) -> str:
@@ -81,10 +84,15 @@ class PlacedShape:
     @property
     def deviations(self) -> Array:
         """(n,) metres, standard deviation of each vertex along its normal, by the pose alone."""
+        rows = self.motion_rows
+        return np.sqrt(np.einsum("ni,ij,nj->n", rows, self.covariance, rows))
+
+    @property
+    def motion_rows(self) -> Array:
+        """(n, 6) how far each vertex moves along its normal under a small motion (turn, shift)."""
         normals = self.normals
         arms = self.vertices - self.T_cam_shape[:3, 3]
-        rows = np.concatenate([np.cross(arms, normals), normals], axis=1)
-        return np.sqrt(np.einsum("ni,ij,nj->n", rows, self.covariance, rows))
+        return np.concatenate([np.cross(arms, normals), normals], axis=1)
 
     def signed_distance(self, points: NDArray[np.floating], band: float) -> Array:
         """Distance (n,), metres, of points (n, 3), camera frame; exact where it is under `band`."""
@@ -108,8 +116,9 @@ class PlacedShape:
         return self.logits(nodes.reshape(-1, 3)).reshape(nodes.shape[:3])
 
     def write(self, group: h5py.Group, shared: SharedParts) -> None:
-        """Attributes name, T_cam_shape (4, 4), width, limit, covariance (6, 6), kin and exact
-        where they apply, and shape, the name of the shape among what the file's objects share."""
+        """Attributes name, T_cam_shape (4, 4), width, limit, covariance (6, 6), kin, exact
+        and alike where they apply, and shape, the name of the shape among what the objects
+        share."""
         group.attrs.update({"name": self.name, "T_cam_shape": self.T_cam_shape})
         group.attrs.update({"width": self.width, "limit": self.limit})
         group.attrs["covariance"] = self.covariance
@@ -117,6 +126,8 @@ class PlacedShape:
             group.attrs["kin"] = True
         if self.exact is not None:
             group.attrs["exact"] = self.exact
+        if len(self.alike):
+            group.attrs["alike"] = self.alike
         group.attrs["shape"] = shared.write("shape", self.shape, _write_shape)
 
     @classmethod
@@ -131,6 +142,7 @@ class PlacedShape:
             np.asarray(group.attrs["covariance"], dtype=np.float64),
             bool(group.attrs.get("kin", False)),
             float(group.attrs["exact"]) if "exact" in group.attrs else None,
+            np.asarray(group.attrs.get("alike", np.empty((0, 4, 4))), dtype=np.float64),
         )
 
 

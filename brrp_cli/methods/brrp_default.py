@@ -23,6 +23,7 @@ from brrp_cli.registration.model import search_model
 from brrp_cli.registration.pose_search import Hypothesis, search
 from brrp_cli.registration.ray_refinement import refine_by_rays
 from brrp_cli.registration.scale_scan import observed_cloud
+from brrp_cli.registration.turned import turned
 from brrp_cli.registration.verification import Verifier
 from brrp_cli.registration.weigh import (
     SeenFrom,
@@ -139,10 +140,16 @@ def reconstruct_by_hypotheses(
     with timed(seconds, "inference"):
         shared = _shared_with_kin(weights, like)
         kept = _kept(shared, hypotheses.map)
+        alike: dict[int, Array] = {}
         for i in kept[kept < len(placed)]:
             placed[i] = _refined(placed[i], verifier, wave, hypotheses, views)
+            if not views:
+                best = turned(placed[i], verifier, hypotheses.sensor.patch, hypotheses.search)
+                if best.best is not placed[i]:
+                    placed[i] = _refined(best.best, verifier, wave, hypotheses, views)
+                alike[i] = best.alike
         shapes = [
-            placed_shape(placed[i], observation.points, wave, hypotheses, views)
+            placed_shape(placed[i], observation.points, wave, hypotheses, views, alike.get(i))
             if i < len(placed)
             else like[i - len(placed)].shape
             for i in kept

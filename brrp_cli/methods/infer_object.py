@@ -87,8 +87,10 @@ def placed_shape(
     wave: float,
     config: HypothesesConfig,
     views: EarlierViews = ALONE,
+    alike: Array | None = None,
 ) -> PlacedShape:
-    """The less the frame says for the placement, and the less it fixes its pose, the softer its
+    """Where `hypothesis` puts it; alike : (K, 4, 4) T_cam_model of placements that are as probable.
+    The less the frame says for the placement, and the less it fixes its pose, the softer its
     surface."""
     stored, mean = hypothesis.model.stored, config.mean
     covariance = pose_covariance(
@@ -98,6 +100,8 @@ def placed_shape(
     shape = PlacedShape(
         stored.name, stored.shape, hypothesis.T_cam_object, mean.width, mean.limit, covariance
     )
+    if alike is not None:
+        shape = replace(shape, alike=alike @ hypothesis.model.T_model_object)
     by_pose = float(np.sqrt(np.mean(shape.deviations**2))) / LOGISTIC_DEVIATION
     return replace(shape, width=float(np.hypot(mean.width, by_pose)) + doubt)
 

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from brrp_cli.config import SensorConfig
 from brrp_cli.frames.frame import BACKGROUND, Frame
+from brrp_cli.observation.subsample import cells_of
 from brrp_cli.observation.support_plane import Plane, plane_frame
 
 Array = NDArray[np.float64]
@@ -37,10 +38,10 @@ def wave_deviation(frame: Frame, plane: Plane | None, config: SensorConfig) -> f
     points, height = points[near], height[near]
     along = points @ plane.normal / np.linalg.norm(points, axis=1)
     on_plane = points @ plane_frame(plane)[:2, :3].T
-    cells = np.floor(on_plane / config.patch).astype(np.int64)
-    _, cell, count = np.unique(cells, axis=0, return_inverse=True, return_counts=True)
+    cell = cells_of(on_plane, config.patch)
+    count = np.bincount(cell)
     error = height / np.maximum(np.abs(along), 0.1)
-    mean = np.bincount(cell.ravel(), error) / count
+    mean = np.bincount(cell, error) / count
     whole = mean[count >= config.patch_points]
     if len(whole) < config.least_patches:
         return config.wave

@@ -32,6 +32,17 @@ def grid_subsample(points: NDArray[np.floating], cell: float) -> NDArray[np.floa
     return (sums / count[occupied, None]).astype(np.float32)
 
 
+def cells_of(points: NDArray[np.floating], cell: float) -> NDArray[np.int64]:
+    """(n,) number, from 0 on and without gaps, of the grid cell of `cell` that each of points
+    (n, d) lies in; in the order of the cells, the last coordinate fastest."""
+    if not len(points):
+        return np.empty(0, np.int64)
+    cells = np.floor(points / cell).astype(np.int64)
+    cells -= cells.min(axis=0)
+    index = np.ravel_multi_index(tuple(cells.T), tuple(cells.max(axis=0) + 1))
+    return np.unique(index, return_inverse=True)[1].reshape(-1)
+
+
 def dense_points(
     points: NDArray[np.floating], cell: float, least_share: float
 ) -> NDArray[np.floating]:
@@ -40,7 +51,6 @@ def dense_points(
     lies behind it are few and far between."""
     if not len(points):
         return points
-    cells = np.floor(points / cell).astype(np.int64)
-    _, cell_of, count = np.unique(cells, axis=0, return_inverse=True, return_counts=True)
-    around = count[cell_of.ravel()]
+    cell_of = cells_of(points, cell)
+    around = np.bincount(cell_of)[cell_of]
     return points[around >= least_share * np.median(around)]

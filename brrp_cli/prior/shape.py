@@ -92,6 +92,11 @@ class StoredShape:
             distance[near] = self.nearest(points[near])[0]
         return distance
 
+    def distance(self, points: NDArray[np.floating]) -> NDArray[np.float64]:
+        """Exact distance (n,) of points (n, 3) from the surface, without a sign."""
+        query = import_open3d().core.Tensor(np.ascontiguousarray(points, dtype=np.float32))
+        return np.asarray(self.scene.compute_distance(query, nthreads=1).numpy(), dtype=np.float64)
+
     def nearest(
         self, points: NDArray[np.floating]
     ) -> tuple[NDArray[np.float64], NDArray[np.int64]]:

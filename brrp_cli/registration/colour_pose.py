@@ -6,6 +6,8 @@ and colour can.
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
@@ -14,37 +16,43 @@ from brrp_cli.config import ColourConfig
 from brrp_cli.frames.frame import Frame
 from brrp_cli.frames.projection import depth_behind, pixel_numbers
 from brrp_cli.geometry import transform_points
+from brrp_cli.observation.subsample import cells_of
 from brrp_cli.registration.model import Model
 
 Array = NDArray[np.float64]
 
 
-def turns_about_itself(turns: int) -> Rotation:
-    """Turns of a model about each axis of its box, both ways up, each once: those under which a
-    box, a can or a bottle looks alike, among others. The first is none."""
+@cache
+def turns_about_itself(turns: int) -> Array:
+    """(K, 3, 3) turns of a model about each axis of its box, both ways up, each once: those under
+    which a box, a can or a bottle looks alike, among others. The first is none."""
     angles = np.arange(turns) * (2 * np.pi / turns)
-    found = [Rotation.identity()]
+    found = [np.eye(3)[None]]
     for axis, other in (("z", "x"), ("y", "z"), ("x", "y")):
+        about = Rotation.from_euler(axis, angles[:, None])
         for flip in (Rotation.identity(), Rotation.from_euler(other, np.pi)):
-            found += [Rotation.from_euler(axis, angle) * flip for angle in angles]
-    every = Rotation.concatenate(found)
-    matrices = np.round(every.as_matrix(), 6) + 0.0
-    first = np.unique(matrices.reshape(len(matrices), -1), axis=0, return_index=True)[1]
-    return every[np.sort(first)]
+            found.append((about * flip).as_matrix())
+    every = np.concatenate(found)
+    rounded = np.round(every, 6) + 0.0
+    first = np.unique(rounded.reshape(len(every), -1), axis=0, return_index=True)[1]
+    return np.asarray(every[np.sort(first)])
 
 
-def best_and_different(
-    turns: Rotation, score: Array, count: int, apart: float
-) -> NDArray[np.int64]:
-    """Rows of the `count` best turns, first those that are `apart` radians or more from all better
-    ones: the front of a box is not to be crowded out by its back, turned a little."""
+def best_and_different(turns: Array, score: Array, count: int, apart: float) -> NDArray[np.int64]:
+    """Rows of the `count` best of turns (K, 3, 3), first those that are `apart` radians or more
+    from all better ones: the front of a box is not to be crowded out by its back, turned a
+    little."""
     order = np.argsort(-score, kind="stable")
     different: list[int] = []
     for row in order:
-        angle = (turns[different].inv() * turns[int(row)]).magnitude() if different else np.inf
-        if np.min(angle) >= apart:
+        # The trace of the turn between two is 1 + 2 cos of its angle.
+        cosine = (np.einsum("kij,ij->k", turns[different], turns[row]) - 1) / 2
+        if (cosine <= np.cos(apart) + 1e-9).all():
             different.append(int(row))
-    rest = [row for row in order if row not in set(different)]
+        if len(different) == count:
+            break
+    taken = set(different)
+    rest = [row for row in order if row not in taken]
     return np.array([*different, *rest][:count], dtype=np.int64)
 
 
@@ -80,10 +88,10 @@ def _compared(
     seen = facing & inside & near
     if seen.sum() < config.least_seen:
         return 0.0, 0.0
-    cells = np.floor(metric[seen] / config.cell).astype(np.int64)
-    _, cell, count = np.unique(cells, axis=0, return_inverse=True, return_counts=True)
-    stored = _by_cell(shape.colours[rows[seen]], cell.reshape(-1), count)
-    image = _by_cell(frame.rgb.reshape(-1, 3)[pixel[seen]], cell.reshape(-1), count)
+    cell = cells_of(metric[seen], config.cell)
+    count = np.bincount(cell)
+    stored = _by_cell(shape.colours[rows[seen]], cell, count)
+    image = _by_cell(frame.rgb.reshape(-1, 3)[pixel[seen]], cell, count)
     spread = np.array([np.linalg.norm(stored), np.linalg.norm(image)])
     deviation = spread / np.sqrt(3 * count.sum())
     if deviation.min() < config.plain:

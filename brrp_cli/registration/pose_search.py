@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from brrp_cli.config import FeatureConfig, SearchConfig
-from brrp_cli.geometry import similarity, transform_points
+from brrp_cli.geometry import as_transforms, transform_points
 from brrp_cli.registration.colour_pose import (
     best_and_different,
     textured_agreement,
@@ -122,7 +122,7 @@ def by_colour(
     if not model.stored.record.get("coloured"):
         return found
     turns = turns_about_itself(colour.turns)
-    T = np.stack([best.T_cam_model @ similarity(rotation=each) for each in turns.as_matrix()])
+    T = best.T_cam_model @ as_transforms(turns)
     score = _coarse_score(T, model, verifier, config)
     T = _refined(
         T[best_and_different(turns, score, config.middle, colour.apart)],

@@ -50,6 +50,25 @@ def beyond_reach(shape: PlacedShape, reach: Array, axes: Axes, further: float) -
     return np.asarray(beyond.reshape([len(axis) for axis in axes]))
 
 
+def reach_of_alike(shape: PlacedShape) -> Array:
+    """(n,) metres by which the placements that are as probable (`alike`) go beyond each vertex."""
+    reach = np.zeros(len(shape.shape.vertices))
+    T_shape_cam = np.linalg.inv(shape.T_cam_shape)
+    for T in shape.alike:
+        vertices = transform_points(T_shape_cam @ T, shape.shape.vertices.astype(np.float64))
+        distance, face = shape.shape.nearest(vertices)
+        out = np.maximum(distance, 0.0) * shape.unit
+        for corner in shape.shape.faces[face].T:
+            np.maximum.at(reach, corner, out)
+    # Between two vertices of a placement lies what neither of them reaches.
+    wider = reach.copy()
+    for a, b in ((0, 1), (1, 2), (2, 0)):
+        first, second = shape.shape.faces[:, a], shape.shape.faces[:, b]
+        np.maximum.at(wider, first, reach[second])
+        np.maximum.at(wider, second, reach[first])
+    return wider
+
+
 def marching_cubes_of(inside: NDArray[np.floating], axes: Axes) -> tuple[Array, NDArray[np.int64]]:
     """Vertices (n, 3), metres, and faces (m, 3) of the closed, outward surface of {inside > 0},
     where `inside` (nx, ny, nz) is given at the nodes of a grid."""

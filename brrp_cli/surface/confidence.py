@@ -17,9 +17,10 @@ and a joint probability to choose among them: Bolin and Lindgren, "Excursion and
 regions for latent Gaussian models", JRSS B 77 (2015), section 2.
 
 Of a recognised object the place is in doubt, and not the shape. There the region is a band around
-its mesh: all placements inside the ellipsoid that holds the true one with the given probability, at
-once (Scheffe's simultaneous confidence band; six unknowns), and what the stored mesh itself may be
-off.
+its mesh, as wide at each vertex as its standard deviation times one factor: the smallest that holds
+all vertices at once with the given probability when the pose is drawn from its covariance (a
+simultaneous confidence band), and what the stored mesh itself may be off. Where the object may as
+well be turned about itself, the band reaches as far as those placements do.
 
 The posterior is what it is: where it is too sure, so is C_t. A margin d grows C_t beyond it, into
 {x outside of C_t : distance to C_t <= d and x was not seen to be empty}.
@@ -32,15 +33,26 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import chi2, norm
+from scipy.stats import norm
 
 from brrp_cli.config import SurfaceConfig
 from brrp_cli.inference.hypothesis_posterior import HypothesisPosterior
 from brrp_cli.inference.particles import particle_shares, particle_volumes
+from brrp_cli.inference.placed_shape import PlacedShape
 from brrp_cli.reconstruction import Axes, OccupancyPosterior
-from brrp_cli.surface.around_mesh import around_axes, beyond_reach, marching_cubes_of
+from brrp_cli.seeds import child_rng
+from brrp_cli.surface.around_mesh import (
+    around_axes,
+    beyond_reach,
+    marching_cubes_of,
+    reach_of_alike,
+)
 from brrp_cli.surface.extract import grid_axes, level_set
 from brrp_cli.surface.stored_mesh import along_normals, moved_to_level, placed
+
+# Of the pose, and the vertices that are looked at: enough for two digits.
+DRAWS = 4_000
+DRAWN_VERTICES = 300
 
 # Which of points (n, 3), metres, camera frame, were seen to be empty: (n,) bool.
 Empty = Callable[[NDArray[np.float64]], NDArray[np.bool_]]
@@ -141,12 +153,13 @@ def _around_stored_mesh(
     if best.off > config.most_off:
         return None
     shape = placed(posterior, number)
-    # All placements that are as probable, at once (Scheffe's band): the pose has six unknowns.
-    by_pose = np.sqrt(chi2.ppf(confidence, 6)) * shape.deviations
+    by_pose = simultaneous(shape, confidence) * shape.deviations
     band = np.hypot(by_pose, norm.ppf((1 + confidence) / 2) * config.fidelity)
     moved = np.einsum("ni,ni->n", best.vertices - through.vertices, through.normals)
     # Where a vertex is a corner, its faces move by less than itself.
-    reach = moved + band * shape.shape.corners
+    corners = band * shape.shape.corners
+    # Of placements turned otherwise none is probable by itself: half of the band is theirs.
+    reach = moved + np.maximum(corners, reach_of_alike(shape) + corners / 2)
     axes = around_axes(shape, float(reach.max()) + margin, config)
     beyond = beyond_reach(shape, reach, axes, margin)
     if margin > 0:
@@ -161,6 +174,17 @@ def _around_stored_mesh(
         inside = np.maximum(inside, occupied * (axes[0][1] - axes[0][0]))
     found = marching_cubes_of(inside, axes)
     return ConfidenceSurface(*found, confidence, 1 - confidence, bounded=True)
+
+
+def simultaneous(shape: PlacedShape, confidence: float) -> float:
+    """How many standard deviations a band around the shape reaches outwards that holds its whole
+    surface, moved by a draw from the covariance of its pose, with the given probability."""
+    rows = shape.motion_rows[:: max(1, len(shape.normals) // DRAWN_VERTICES)]
+    rng = child_rng(0, "simultaneous band")
+    root = np.linalg.cholesky(shape.covariance)
+    out = rows @ (root @ rng.standard_normal((6, DRAWS)))
+    deviations = np.sqrt(((rows @ root) ** 2).sum(axis=1))
+    return float(np.quantile((out / deviations[:, None]).max(axis=0), confidence))
 
 
 def _less_margin(

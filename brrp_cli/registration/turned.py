@@ -1,0 +1,140 @@
+"""Placements of one object that differ by a turn under which it looks almost alike.
+
+A ball, a fruit or a cup is almost the same however it is turned about itself. The search keeps one
+placement of those whose surfaces lie together. Which of them is right, the pixels tell at most by
+fractions of a millimetre, over the whole of what is seen: here they are compared pixel by pixel,
+and what they cannot decide is kept.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cache
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from brrp_cli.config import SearchConfig, TurnConfig
+from brrp_cli.geometry import as_transforms, transform_points
+from brrp_cli.observation.subsample import cells_of
+from brrp_cli.registration.colour_pose import (
+    best_and_different,
+    textured_agreement,
+    turns_about_itself,
+)
+from brrp_cli.registration.pose_search import Hypothesis
+from brrp_cli.registration.sdf_refinement import refine_to_sdf
+from brrp_cli.registration.verification import Verifier
+from brrp_cli.seeds import child_rng
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Turned:
+    """best : the placement that fits best; alike : (K, 4, 4) T_cam_model of others, turned
+    otherwise, that what was seen does not tell apart from it"""
+
+    best: Hypothesis
+    alike: Array
+
+
+def turned(placed: Hypothesis, verifier: Verifier, patch: float, config: SearchConfig) -> Turned:
+    """`placed`, or where it fits what was seen better, turned about itself; and what fits as well.
+
+    patch : metres; pixels within one err together and are one vote
+    """
+    turn = config.turn
+    start = _nearly_itself(placed, turn)
+    if not len(start):
+        return Turned(placed, np.empty((0, 4, 4)))
+    points = verifier.points[: turn.points]
+    T = placed.T_cam_model @ start
+    coarse = np.minimum(_distances(T, placed, points[: turn.coarse_points]), turn.far).mean(axis=1)
+    T = T[best_and_different(start[:, :3, :3], -coarse, turn.count, turn.apart)]
+    refined = refine_to_sdf(
+        np.asarray(np.linalg.inv(T), dtype=np.float64),
+        points[: config.fine_points],
+        placed.model,
+        config.fine_distance,
+        config.middle_steps,
+    )
+    T = np.asarray(np.linalg.inv(refined), dtype=np.float64)
+    near = np.minimum(_distances(T, placed, points[: config.fine_points]), turn.far).mean(axis=1)
+    T = T[np.argsort(near, kind="stable")[: turn.judged]]
+    T = np.concatenate([placed.T_cam_model[None], T])
+    T = T[_as_much_allowed(T, placed, verifier, config)]
+    exact = np.minimum(_distances(T, placed, points, exact=True), turn.far)
+    worse, doubt = _worse_than(0, exact, points, patch)
+    first = int(np.argmin(worse + turn.gain * doubt))
+    worse, doubt = _worse_than(first, exact, points, patch)
+    alike = (worse <= turn.undecided * doubt) & (np.arange(len(T)) != first)
+    best = placed if first == 0 else replace(placed, T_cam_model=T[first])
+    return Turned(best, np.asarray(T[alike]))
+
+
+def _nearly_itself(placed: Hypothesis, config: TurnConfig) -> Array:
+    """(K, 4, 4) turns about the middle that bring the surface back to within `config.itself` of
+    itself, on average."""
+    model = placed.model
+    surface = model.surface[: config.surface_points]
+    every = _every_turn(config.turns, config.any_turns)
+    moved = np.einsum("kij,nj->kni", every, surface)
+    off = np.abs(model.signed_distance(moved.reshape(-1, 3))).reshape(len(every), -1).mean(axis=1)
+    return as_transforms(every[off < config.itself])
+
+
+@cache
+def _every_turn(turns: int, any_turns: int) -> Array:
+    """(K, 3, 3): about the axes of the box, and any."""
+    drawn = Rotation.random(any_turns, random_state=child_rng(0, "turned")).as_matrix()
+    return np.concatenate([turns_about_itself(turns)[1:], drawn])
+
+
+def _distances(
+    T_cam_model: Array, placed: Hypothesis, points: Array, *, exact: bool = False
+) -> Array:
+    """(K, n) metres of points (n, 3), camera frame, from the surface under each placement; by the
+    coarse field, or exact."""
+    stored = placed.model.stored
+    T_model_cam = np.linalg.inv(T_cam_model)
+    moved = np.concatenate([transform_points(each, points) for each in T_model_cam])
+    if exact:
+        distance = stored.shape.distance(moved / stored.half_extent) * stored.half_extent
+    else:
+        distance = np.abs(placed.model.signed_distance(moved))
+    return np.asarray((distance * placed.scale).reshape(len(T_cam_model), -1))
+
+
+def _worse_than(first: int, distances: Array, points: Array, patch: float) -> tuple[Array, Array]:
+    """Mean (K,), metres, by which points lie further from the surface under each placement than
+    under one of them, and its standard error over patches: neighbouring pixels err together."""
+    difference = distances - distances[first]
+    cell = cells_of(points, patch)
+    mean = difference.mean(axis=1)
+    residual = difference - mean[:, None]
+    sums = np.stack([np.bincount(cell, weights=each) for each in residual])
+    return mean, np.sqrt((sums**2).sum(axis=1)) / len(points)
+
+
+def _as_much_allowed(
+    T: Array, placed: Hypothesis, verifier: Verifier, config: SearchConfig
+) -> NDArray[np.bool_]:
+    """(K,) whether free space, the table and colours speak no more against each placement than
+    against the first."""
+    score = verifier.score(
+        T,
+        placed.model,
+        config.alignment_score,
+        model_points=config.fine_points,
+        seen_points=config.fine_points,
+    )
+    allowed = score >= score[0] - config.turn.alike
+    if placed.model.stored.record.get("coloured"):
+        colour = config.colour
+        agreement = np.array(
+            [textured_agreement(each, placed.model, verifier.frame, colour) for each in T]
+        )
+        allowed &= colour.worth * (agreement - agreement[0]) >= -colour.gain
+    return np.asarray(allowed)
