@@ -69,27 +69,36 @@ def turned(placed: Hypothesis, verifier: Verifier, patch: float, config: SearchC
     worse, doubt = _worse_than(0, exact, points, patch)
     first = int(np.argmin(worse + turn.gain * doubt))
     worse, doubt = _worse_than(first, exact, points, patch)
-    alike = (worse <= turn.undecided * doubt) & (np.arange(len(T)) != first)
+    alike = (worse <= turn.undecided * doubt) & (_angles(T, T[first]) >= turn.apart)
     best = placed if first == 0 else replace(placed, T_cam_model=T[first])
     return Turned(best, np.asarray(T[alike]))
 
 
 def _nearly_itself(placed: Hypothesis, config: TurnConfig) -> Array:
-    """(K, 4, 4) turns about the middle that bring the surface back to within `config.itself` of
-    itself, on average."""
+    """(K, 4, 4) turns about the middle, by `config.apart` at least, that bring the surface back to
+    within `config.itself` of itself, on average."""
     model = placed.model
     surface = model.surface[: config.surface_points]
-    every = _every_turn(config.turns, config.any_turns)
+    every = _every_turn(config)
     moved = np.einsum("kij,nj->kni", every, surface)
     off = np.abs(model.signed_distance(moved.reshape(-1, 3))).reshape(len(every), -1).mean(axis=1)
     return as_transforms(every[off < config.itself])
 
 
 @cache
-def _every_turn(turns: int, any_turns: int) -> Array:
+def _every_turn(config: TurnConfig) -> Array:
     """(K, 3, 3): about the axes of the box, and any."""
-    drawn = Rotation.random(any_turns, random_state=child_rng(0, "turned")).as_matrix()
-    return np.concatenate([turns_about_itself(turns)[1:], drawn])
+    drawn = Rotation.random(config.any_turns, random_state=child_rng(0, "turned")).as_matrix()
+    every = np.concatenate([turns_about_itself(config.turns), drawn])
+    return np.asarray(every[_angles(every, np.eye(3)) >= config.apart])
+
+
+def _angles(T: Array, other: Array) -> Array:
+    """(K,) radians between rotations or similarities of one size (K, ...) and another."""
+    R, S = T[:, :3, :3], other[:3, :3]
+    square = (S**2).sum() / 3
+    cosine = (np.einsum("kij,ij->k", R, S) / square - 1) / 2
+    return np.asarray(np.arccos(np.clip(cosine, -1, 1)))
 
 
 def _distances(

@@ -180,11 +180,14 @@ def simultaneous(shape: PlacedShape, confidence: float) -> float:
     """How many standard deviations a band around the shape reaches outwards that holds its whole
     surface, moved by a draw from the covariance of its pose, with the given probability."""
     rows = shape.motion_rows[:: max(1, len(shape.normals) // DRAWN_VERTICES)]
-    rng = child_rng(0, "simultaneous band")
-    root = np.linalg.cholesky(shape.covariance)
-    out = rows @ (root @ rng.standard_normal((6, DRAWS)))
-    deviations = np.sqrt(((rows @ root) ** 2).sum(axis=1))
-    return float(np.quantile((out / deviations[:, None]).max(axis=0), confidence))
+    values, vectors = np.linalg.eigh(shape.covariance)
+    along = rows @ (vectors * np.sqrt(np.maximum(values, 0.0)))
+    deviations = np.linalg.norm(along, axis=1)
+    along = along[deviations > 0] / deviations[deviations > 0, None]
+    if not len(along):
+        return 0.0
+    draws = child_rng(0, "simultaneous band").standard_normal((6, DRAWS))
+    return float(np.quantile((along @ draws).max(axis=0), confidence))
 
 
 def _less_margin(

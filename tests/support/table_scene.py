@@ -63,7 +63,16 @@ def ball() -> trimesh.Trimesh:
     return solids.moved(trimesh.creation.icosphere(subdivisions=4, radius=0.05), z=0.05)
 
 
-MESHES = {"box": box, "ell": ell, "ball": ball, "beaker": beaker}
+def fruit() -> trimesh.Trimesh:
+    """Nearly a ball: dents and bumps of 2 mm, which no turn maps to themselves."""
+    mesh = trimesh.creation.icosphere(subdivisions=4, radius=0.05)
+    x, y, z = mesh.vertices.T / 0.05
+    bumps = np.sin(3 * x + 1) * np.cos(2 * y) + 0.5 * np.sin(4 * z + x)
+    mesh.vertices *= (1 + 0.04 * bumps)[:, None]
+    return solids.moved(mesh, z=-mesh.bounds[0, 2])
+
+
+MESHES = {"box": box, "ell": ell, "ball": ball, "beaker": beaker, "fruit": fruit}
 
 
 @cache

@@ -5,14 +5,23 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import trimesh
+from closed_shapes import at
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from made_result import posterior_on
+from scipy.stats import chi, norm
 
 from brrp_cli.config import SurfaceConfig
 from brrp_cli.inference.particles import particle_shares, particle_volumes
-from brrp_cli.surface.confidence import confidence_level, confidence_surface
+from brrp_cli.raycast import inside
+from brrp_cli.surface.around_mesh import (
+    around_axes,
+    beyond_reach,
+    marching_cubes_of,
+    reach_of_alike,
+)
+from brrp_cli.surface.confidence import confidence_level, confidence_surface, simultaneous
 from brrp_cli.surface.extract import extract_surface, grid_axes
 
 CENTER = np.array([0.1, -0.05, 0.8])
@@ -190,3 +199,40 @@ def test_particles_count_by_their_weight():
     mean = np.tensordot(particle_shares(weighted, 2), volumes, axes=1)
     np.testing.assert_allclose(mean, weighted.probability_volume(axes), atol=1e-6)
     np.testing.assert_array_equal(particle_shares(two.correction, 4), [0.25] * 4)
+
+
+def placed_box(covariance, **more):
+    return replace(at(trimesh.creation.box([0.06, 0.08, 0.1])), covariance=covariance, **more)
+
+
+def test_a_band_around_a_placed_shape_holds_all_of_it_at_once():
+    """A shift along one axis moves a ball outwards at one pole by its own length, so that the band
+    is the two-sided quantile of a normal variable; a shift along all three, by its length: that of
+    chi with three degrees of freedom."""
+    ball = at(trimesh.creation.icosphere(subdivisions=4, radius=0.03))
+    one, three = np.zeros((6, 6)), np.zeros((6, 6))
+    one[3, 3], three[3:, 3:] = 1e-6, 1e-6 * np.eye(3)
+    found = simultaneous(replace(ball, covariance=one), 0.95)
+    assert found == pytest.approx(norm.ppf(0.975), rel=0.04)
+    found = simultaneous(replace(ball, covariance=three), 0.95)
+    assert found == pytest.approx(chi.ppf(0.95, 3), rel=0.04)
+    assert simultaneous(ball, 0.95) == 0, "a pose that is known"
+
+
+def test_a_turn_that_is_as_probable_lies_inside():
+    """A box on a table that may as well be turned by 20 degrees."""
+    turn = np.eye(4)
+    turn[:3, :3] = trimesh.transformations.rotation_matrix(np.radians(20), [0, 0, 1])[:3, :3]
+    alone = placed_box(1e-8 * np.eye(6))
+    both = replace(alone, alike=(turn @ alone.T_cam_shape)[None])
+    reach = reach_of_alike(both)
+    assert reach_of_alike(alone).max() == 0
+    # A corner of the turned box lies beyond the side by as much as it turned out.
+    corner = 0.03 * np.cos(np.radians(20)) + 0.04 * np.sin(np.radians(20)) - 0.03
+    assert reach.max() == pytest.approx(corner, rel=0.05)
+    axes = around_axes(both, float(reach.max()), SurfaceConfig(around_nodes=400_000))
+    region = trimesh.Trimesh(
+        *marching_cubes_of(-beyond_reach(both, reach, axes, 0.0), axes), process=False
+    )
+    vertices = replace(both, T_cam_shape=both.alike[0]).vertices
+    assert inside(region, 0.999 * vertices).all()
