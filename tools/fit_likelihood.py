@@ -1,0 +1,341 @@
+"""Fit the constants of the likelihood of placements on made scenes, or report with those in use.
+
+    python tools/fit_likelihood.py --prior prior/ --data-root data/ -o fit.jsonl stereo/ xtion/
+    python tools/fit_likelihood.py --prior prior/ --data-root data/ -o test.jsonl --report test/
+
+Scenes of objects that the prior holds and of others, made with `tools/make_scenes.py --sensor`.
+With `--segment` masks come from the frame alone, as users' do; what a mask shows is then the object
+that most of its pixels belong to. Every mask is searched for as the default preset does. A placement is
+right if it is of the true object and its surface lies within 5 mm of the true one on average;
+where none is, "none of them" is right. What is minimised is the mean of -ln of the weight of what
+is right, with a pull to the constants in use. Printed are values for LikelihoodConfig in
+brrp_cli/config/registration.py, and what becomes of each set.
+
+One line of OUTPUT for each mask; a second run goes on where the first was stopped.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import click
+import numpy as np
+from numpy.typing import NDArray
+
+# The script also runs from a checkout that is not installed.
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+from brrp_cli.config import Config, LikelihoodConfig, preset
+from brrp_cli.errors import BrrpError
+from brrp_cli.evaluation.calibration import expected_calibration_error
+from brrp_cli.frames.frame import Frame
+from brrp_cli.geometry import transform_points
+from brrp_cli.ground_truth.scenes import Scene, find_scenes, true_mesh_in_camera
+from brrp_cli.observation.pixel_noise import pixel_noise
+from brrp_cli.observation.ray_samples import observe
+from brrp_cli.observation.strays import without_strays
+from brrp_cli.prior.store import Prior, open_prior
+from brrp_cli.progress import progress
+from brrp_cli.raycast import raycasting_scene
+from brrp_cli.registration.likelihood import depth_ratio, evidence, see
+from brrp_cli.registration.model import search_model
+from brrp_cli.registration.pose_search import Hypothesis, search
+from brrp_cli.registration.scale_scan import observed_cloud
+from brrp_cli.registration.verification import Verifier
+from brrp_cli.registration.weigh import weigh
+from brrp_cli.retrieval.base import top_k, unknown
+from brrp_cli.retrieval.choose import choose_retriever
+from brrp_cli.seeds import child_rng, child_seed
+from brrp_cli.segmentation.segment import segment
+
+NEAR = 0.005  # metres
+FITTED = ("depth", "missed", "covered", "free_space", "below", "colour", "base", "most_votes")
+# Of ln of a constant, nats of `base`: how far the fit may go from the constants in use.
+PULL = 1.0
+
+
+@dataclass(frozen=True)
+class Placed:
+    """What speaks for one placement: P(c|R), nats by depth, votes, and what `PlacementEvidence`
+    has; whether its size is another one, and whether it is right."""
+
+    share: float
+    depth: float
+    votes: float
+    missed: float
+    covered: float
+    free: float
+    below: float
+    colour: float
+    resized: bool
+    right: bool
+
+
+@dataclass(frozen=True)
+class Mask:
+    """group : name of its set; scene, number : which; missing : P(not in the prior | R)"""
+
+    group: str
+    scene: str
+    number: int
+    name: str
+    pixels: int
+    stored: bool
+    missing: float
+    placed: list[Placed]
+
+
+@click.command()
+@click.option("--prior", "prior_path", required=True, type=click.Path(path_type=Path))
+@click.option("--data-root", type=click.Path(path_type=Path))
+@click.option("--segment", "segmented", is_flag=True, help="Masks from the frame alone.")
+@click.option("--report", is_flag=True, help="Fit nothing: report with the constants in use.")
+@click.option("-o", "--output", required=True, type=click.Path(path_type=Path))
+@click.argument("sets", nargs=-1, type=click.Path(path_type=Path))
+def main(
+    prior_path: Path,
+    data_root: Path | None,
+    segmented: bool,
+    report: bool,
+    output: Path,
+    sets: tuple[Path, ...],
+) -> None:
+    """Collect from SETS, folders of scenes, into OUTPUT; fit on all that OUTPUT holds."""
+    masks = read(output)
+    try:
+        prior = open_prior(prior_path)
+        done = {(mask.group, mask.scene) for mask in masks}
+        for folder in sets:
+            group = folder.name + (", masks from depth" if segmented else "")
+            for scene in progress(find_scenes(folder), group):
+                if (group, scene.name) in done:
+                    continue
+                found = collect(scene, group, prior, data_root, segmented)
+                with output.open("a") as stream:
+                    stream.writelines(json.dumps(as_json(mask)) + "\n" for mask in found)
+                masks += found
+    except BrrpError as error:
+        raise click.ClickException(str(error)) from error
+    config = preset("default")
+    assert config.hypotheses is not None
+    if not report:
+        fitted = fit(masks, config)
+        for name in FITTED:
+            before = getattr(config.hypotheses.likelihood, name)
+            click.echo(f"{name}: {getattr(fitted, name):.2f} (in use {before:.2f})")
+        tell(masks, with_likelihood(config, fitted), "fitted")
+    tell(masks, config, "in use")
+
+
+def collect(
+    scene: Scene, group: str, prior: Prior, data_root: Path | None, segmented: bool
+) -> list[Mask]:
+    """Every mask of the first view of a scene."""
+    config = preset("default")
+    hypotheses = config.hypotheses
+    assert hypotheses is not None
+    given = scene.view(0)
+    truth = given.segmap
+    frame = replace(given, segmap=segment(given)) if segmented else given
+    retriever = choose_retriever("appearance", prior, config, 0)
+    cleaned = without_strays(frame, config.strays)
+    seen = observe(cleaned, config.observation, 0)
+    noise = pixel_noise(cleaned, seen.plane, hypotheses.sensor)
+    masks = []
+    for number, observation in seen.objects.items():
+        mine = truth[(frame.segmap == number) & frame.valid]
+        true_id = int(np.bincount(np.maximum(mine, 0)).argmax()) if len(mine) else 0
+        name = scene.object(true_id).name if true_id else "nothing"
+        probabilities = retriever.probabilities(frame, number)
+        points = child_rng(0, "testimony", number).permutation(observation.points)
+        verifier = Verifier(points.astype(np.float64), cleaned, seen.plane)
+        observed = observed_cloud(observation.points, config.features)
+        likelihood, sensor = hypotheses.likelihood, hypotheses.sensor
+        shown = see(cleaned, number, seen.plane, noise, sensor.patch, sensor.bleed, likelihood)
+        found: list[tuple[Hypothesis, float]] = []
+        for stored_name, share in top_k(probabilities, prior.names, config.k):
+            best = max((each.alignment_score for each, _ in found), default=-np.inf)
+            placed = search(
+                search_model(prior.load(stored_name)),
+                observed,
+                verifier,
+                config.features,
+                hypotheses.search,
+                child_seed(0, number),
+                best,
+            )
+            found += [(each, share) for each in placed]
+        best = max((each.alignment_score for each, _ in found), default=-np.inf)
+        near = _nearness(scene, true_id, data_root, given)
+        rows = []
+        for each, share in found:
+            if each.alignment_score < best - likelihood.within:
+                continue
+            told = evidence(
+                each.T_cam_model, each.model, shown, likelihood, hypotheses.search.colour
+            )
+            votes = float(told.share.sum() / told.patches_per_vote)
+            by_depth = float((told.share * depth_ratio(told, likelihood)).sum())
+            rows.append(
+                Placed(
+                    share=float(share),
+                    depth=by_depth / told.patches_per_vote,
+                    votes=votes,
+                    missed=told.missed,
+                    covered=told.covered,
+                    free=told.free,
+                    below=told.below,
+                    colour=told.colour,
+                    resized=abs(np.log(each.scale)) > hypotheses.search.least_size_change,
+                    right=each.model.stored.name == name and near(each) < NEAR,
+                )
+            )
+        masks.append(
+            Mask(
+                group,
+                scene.name,
+                int(number),
+                name,
+                len(mine),
+                name in prior.names,
+                float(unknown(probabilities)),
+                rows,
+            )
+        )
+    return masks
+
+
+def _nearness(scene: Scene, true_id: int, data_root: Path | None, frame: Frame) -> Any:
+    """Hypothesis -> mean distance, metres, of its surface from that of the true object."""
+    from brrp_cli.dependencies import import_open3d
+
+    if not true_id:
+        return lambda each: np.inf
+    assert frame.T_world_cam is not None
+    mesh = true_mesh_in_camera(scene.object(true_id), data_root, frame.T_world_cam).copy()
+    center = mesh.bounds.mean(axis=0)
+    mesh.apply_translation(-center)
+    cast = raycasting_scene([mesh])
+
+    def near(each: Hypothesis) -> float:
+        surface = transform_points(each.T_cam_model, each.model.surface[:1000]) - center
+        query = import_open3d().core.Tensor(surface.astype(np.float32))
+        return float(cast.compute_distance(query).numpy().mean())
+
+    return near
+
+
+def ratios(mask: Mask, config: LikelihoodConfig) -> NDArray[np.float64]:
+    """Log likelihood ratios (C,), nats, of the placements of one mask."""
+    return np.array(
+        [
+            config.base
+            + (
+                config.depth * each.depth
+                - config.missed * each.missed
+                + config.covered * each.covered
+                - config.free_space * each.free
+            )
+            / (1 + each.votes / config.most_votes)
+            - config.below * each.below
+            + config.colour * each.colour
+            - config.other_size * each.resized
+            for each in mask.placed
+        ]
+    )
+
+
+def weights(mask: Mask, config: Config) -> NDArray[np.float64]:
+    """(C + 1,) of the placements of one mask and, last, of none of them."""
+    assert config.hypotheses is not None
+    shares = [each.share for each in mask.placed]
+    found = ratios(mask, config.hypotheses.likelihood)
+    return weigh(shares, found.tolist(), mask.missing, config.hypotheses.weigh)
+
+
+def loss(masks: list[Mask], config: Config) -> float:
+    """Mean of -ln of the weight of what is right."""
+    total = 0.0
+    for mask in masks:
+        right = np.array([*(each.right for each in mask.placed), False])
+        right[-1] = not right.any()
+        total -= np.log(max(float(weights(mask, config)[right].sum()), 1e-6))
+    return total / len(masks)
+
+
+def fit(masks: list[Mask], config: Config) -> LikelihoodConfig:
+    """The constants of least loss, pulled to those in use."""
+    from scipy.optimize import minimize
+
+    assert config.hypotheses is not None
+    start = config.hypotheses.likelihood
+
+    def constants(x: NDArray[np.float64]) -> LikelihoodConfig:
+        changed: dict[str, Any] = {
+            name: float(getattr(start, name) + value)
+            if name == "base"
+            else float(getattr(start, name) * np.exp(value))
+            for name, value in zip(FITTED, x, strict=True)
+        }
+        return replace(start, **changed)
+
+    def worth(x: NDArray[np.float64]) -> float:
+        pulled = PULL * float((x**2).sum()) / len(masks)
+        return loss(masks, with_likelihood(config, constants(x))) + pulled
+
+    return constants(minimize(worth, np.zeros(len(FITTED)), method="L-BFGS-B").x)
+
+
+def with_likelihood(config: Config, likelihood: LikelihoodConfig) -> Config:
+    """With other constants."""
+    assert config.hypotheses is not None
+    return replace(config, hypotheses=replace(config.hypotheses, likelihood=likelihood))
+
+
+def tell(masks: list[Mask], config: Config, what: str) -> None:
+    """What becomes of each set: loss, calibration error of the weight of the best placement, stored
+    objects of 1,000 pixels or more that are recognised, and others that are taken for one."""
+    click.echo(f"\n{what}:")
+    for group in dict.fromkeys(mask.group for mask in masks):
+        mine = [mask for mask in masks if mask.group == group]
+        found = [weights(mask, config) for mask in mine]
+        known = np.array([1 - each[-1] for each in found])
+        right = np.array([any(each.right for each in mask.placed) for mask in mine])
+        best = np.array([0 if len(each) == 1 else int(np.argmax(each[:-1])) for each in found])
+        hit = np.array(
+            [
+                bool(mask.placed) and mask.placed[row].right
+                for mask, row in zip(mine, best, strict=True)
+            ]
+        )
+        large = np.array([mask.stored and mask.pixels >= 1000 for mask in mine])
+        stranger = np.array([not mask.stored for mask in mine])
+        taken = known > 0.5
+        click.echo(
+            f"  {group}: {len(mine)} masks, loss {loss(mine, config):.3f}, "
+            f"ECE {expected_calibration_error(known, right):.3f}; recognised "
+            f"{(taken & hit)[large].mean():.3f} of {large.sum()}; taken wrongly "
+            f"{(taken & ~hit).mean():.3f} of all, "
+            f"{taken[stranger].sum()} of {stranger.sum()} others"
+        )
+
+
+def as_json(mask: Mask) -> dict[str, Any]:
+    """For a line of a file."""
+    return {**vars(mask), "placed": [vars(each) for each in mask.placed]}
+
+
+def read(path: Path) -> list[Mask]:
+    """The masks of a file that a run before wrote; none without one."""
+    if not path.exists():
+        return []
+    rows = [json.loads(line) for line in path.read_text().splitlines()]
+    return [Mask(**{**row, "placed": [Placed(**each) for each in row["placed"]]}) for row in rows]
+
+
+if __name__ == "__main__":
+    main()
