@@ -5,10 +5,10 @@
 
 Scenes of objects that the prior holds and of others, made with `tools/make_scenes.py --sensor`.
 With `--segment` masks come from the frame alone, as users' do; what a mask shows is then the object
-that most of its pixels belong to. Every mask is searched for as the default preset does. A placement is
-right if it is of the true object and its surface lies within 5 mm of the true one on average;
-where none is, "none of them" is right. What is minimised is the mean of -ln of the weight of what
-is right, with a pull to the constants in use. Printed are values for LikelihoodConfig in
+that most of its pixels belong to. Every mask is searched for as the default preset does. A
+placement is right if it is of the true object and its surface lies within 5 mm of the true one on
+average; where none is, "none of them" is right. What is minimised is the mean of -ln of the weight
+of what is right, with a pull to the constants in use. Printed are values for LikelihoodConfig in
 brrp_cli/config/registration.py, and what becomes of each set.
 
 One line of OUTPUT for each mask; a second run goes on where the first was stopped.
