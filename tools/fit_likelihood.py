@@ -189,8 +189,10 @@ def collect(
                     covered=told.covered,
                     free=told.free,
                     below=told.below,
-                    colour=told.colour,
-                    resized=abs(np.log(each.scale)) > hypotheses.search.least_size_change,
+                    colour=float(told.colour),
+                    resized=bool(
+                        abs(np.log(each.scale)) > hypotheses.search.least_size_change
+                    ),
                     right=each.model.stored.name == name and near(each) < NEAR,
                 )
             )
