@@ -41,7 +41,7 @@ from brrp_cli.observation.strays import without_strays
 from brrp_cli.prior.store import Prior, open_prior
 from brrp_cli.progress import progress
 from brrp_cli.raycast import raycasting_scene
-from brrp_cli.registration.likelihood import depth_ratio, evidence, see
+from brrp_cli.registration.likelihood import PlacementEvidence, depth_ratio, evidence, see
 from brrp_cli.registration.model import search_model
 from brrp_cli.registration.pose_search import Hypothesis, search
 from brrp_cli.registration.scale_scan import observed_cloud
@@ -159,7 +159,7 @@ def collect(
         found: list[tuple[Hypothesis, float]] = []
         for stored_name, share in top_k(probabilities, prior.names, config.k):
             best = max((each.alignment_score for each, _ in found), default=-np.inf)
-            placed = search(
+            found_here = search(
                 search_model(prior.load(stored_name)),
                 observed,
                 verifier,
@@ -168,7 +168,7 @@ def collect(
                 child_seed(0, number),
                 best,
             )
-            found += [(each, share) for each in placed]
+            found += [(each, share) for each in found_here]
         best = max((each.alignment_score for each, _ in found), default=-np.inf)
         near = _nearness(scene, true_id, data_root, given)
         rows = []
@@ -178,24 +178,9 @@ def collect(
             told = evidence(
                 each.T_cam_model, each.model, shown, likelihood, hypotheses.search.colour
             )
-            votes = float(told.share.sum() / told.patches_per_vote)
-            by_depth = float((told.share * depth_ratio(told, likelihood)).sum())
-            rows.append(
-                Placed(
-                    share=float(share),
-                    depth=by_depth / told.patches_per_vote,
-                    votes=votes,
-                    missed=told.missed,
-                    covered=told.covered,
-                    free=told.free,
-                    below=told.below,
-                    colour=float(told.colour),
-                    resized=bool(
-                        abs(np.log(each.scale)) > hypotheses.search.least_size_change
-                    ),
-                    right=each.model.stored.name == name and near(each) < NEAR,
-                )
-            )
+            resized = bool(abs(np.log(each.scale)) > hypotheses.search.least_size_change)
+            right = each.model.stored.name == name and near(each) < NEAR
+            rows.append(placed(told, likelihood, share, resized=resized, right=right))
         masks.append(
             Mask(
                 group,
@@ -209,6 +194,30 @@ def collect(
             )
         )
     return masks
+
+
+def placed(
+    told: PlacementEvidence,
+    likelihood: LikelihoodConfig,
+    share: float,
+    *,
+    resized: bool,
+    right: bool,
+) -> Placed:
+    """What counts of a placement's evidence; `likelihood` : its constants that are not fitted."""
+    by_depth = float((told.share * depth_ratio(told, likelihood)).sum())
+    return Placed(
+        share=float(share),
+        depth=by_depth / told.patches_per_vote,
+        votes=float(told.share.sum() / told.patches_per_vote),
+        missed=told.missed,
+        covered=told.covered,
+        free=told.free,
+        below=told.below,
+        colour=float(told.colour),
+        resized=resized,
+        right=right,
+    )
 
 
 def _nearness(scene: Scene, true_id: int, data_root: Path | None, frame: Frame) -> Any:

@@ -12,8 +12,10 @@ from click.testing import CliRunner
 from plain.density import dense_features, gradient, hinge_points, log_posterior, mean_bce
 from plain.svgd import stein_direction as plain_direction
 from speed.frames import with_objects, with_pixels
+from speed.sets import frames_of
 from table_scene import box, in_camera, photograph, placed
 
+from brrp_cli.errors import SceneError
 from brrp_cli.frames.npz import save_frame
 from brrp_cli.inference.density import Lambdas, Samples, log_density, logistic_score
 from brrp_cli.inference.hinge import HingeGrid, cubic_grid, factors, features
@@ -126,6 +128,15 @@ def test_frames_grow_in_one_thing_only(frame):
     np.testing.assert_allclose(*centers, atol=0.002)
 
 
+def test_a_set_is_the_frames_of_a_folder(frame, tmp_path):
+    for name in "cab":
+        save_frame(with_objects(frame, 1 + (name == "a")), tmp_path / f"{name}.npz")
+    assert [len(each.object_ids) for each in frames_of(tmp_path, 2)] == [2, 1]
+    (tmp_path / "none").mkdir()
+    with pytest.raises(SceneError, match="none"):
+        frames_of(tmp_path / "none", 2)
+
+
 @pytest.mark.slow
 def test_the_benchmark_keeps_what_it_measured(frame, tmp_path):
     meshes = tmp_path / "meshes"
@@ -136,6 +147,7 @@ def test_the_benchmark_keeps_what_it_measured(frame, tmp_path):
     save_frame(with_objects(frame, 1), tmp_path / "frame.npz")
     history = tmp_path / "history.jsonl"
     options = ["--no-made", "--repeats", "2", "--plain-objects", "0", "--no-cold", "--workers", "1"]
+    options += ["--set", f"mine={tmp_path}"]
     result = CliRunner().invoke(
         main,
         [str(tmp_path / "frame.npz"), "--prior", str(prior), "--json", str(history), *options],
@@ -147,6 +159,9 @@ def test_the_benchmark_keeps_what_it_measured(frame, tmp_path):
     record = json.loads(line)
     assert record["frames"][0]["denormals"] == {} and "denormal numbers: none" in result.output
     assert record["machine"]["flops"] > 0 and record["peak_megabytes"] > 0
+    (row,) = record["sets"]
+    assert row["frames"] == row["objects"] == row["known"] == 1 and row["plain"] is None
+    assert 0 < row["an_object"] == row["a_frame"] and row["busy"] > 0
     (found,) = record["frames"]
     assert found["objects"] == 1 and set(found["limits"]) <= set(found["stages"])
     for each in [*found["stages"].values(), *found["whole"].values()]:
