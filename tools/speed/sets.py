@@ -13,7 +13,6 @@ import numpy as np
 from plain.reconstruct import STAGES, reconstruct_plainly
 
 from brrp_cli.config import preset
-from brrp_cli.errors import FrameError
 from brrp_cli.frames.frame import Frame
 from brrp_cli.frames.readers import read_frame
 from brrp_cli.ground_truth.scenes import find_scenes
@@ -66,13 +65,10 @@ def frames_of(folder: Path, most: int) -> list[Frame]:
 
     Errors: FrameError, SceneError.
     """
-    scenes = [] if any(folder.glob("*.npz")) else find_scenes(folder)
-    if scenes:
-        return [scene.view(0) for scene in scenes[:most]]
-    frames = [read_frame(path) for path in sorted(folder.glob("*.npz"))[:most]]
-    if not frames:
-        raise FrameError("No frame to time", where=folder, expected="*.npz or scenes")
-    return frames
+    paths = sorted(folder.glob("*.npz"))[:most]
+    if paths:
+        return [read_frame(path) for path in paths]
+    return [scene.view(0) for scene in find_scenes(folder)[:most]]
 
 
 def measure_set(
