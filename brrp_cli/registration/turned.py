@@ -64,10 +64,11 @@ def turned(placed: Hypothesis, verifier: Verifier, patch: float, config: SearchC
     near = np.minimum(_distances(T, placed, points[: config.fine_points]), turn.far).mean(axis=1)
     T = T[np.argsort(near, kind="stable")[: turn.judged]]
     T = np.concatenate([placed.T_cam_model[None], T])
-    T = T[_as_much_allowed(T, placed, verifier, config)]
+    T = T[_as_much_explained(T, placed, verifier, config)]
     exact = np.minimum(_distances(T, placed, points, exact=True), turn.far)
     worse, doubt = _worse_than(0, exact, points, patch)
-    first = int(np.argmin(worse + turn.gain * doubt))
+    better = worse + turn.gain * doubt
+    first = int(np.argmin(np.where(_as_much_alike(T, placed, verifier, config), better, np.inf)))
     worse, doubt = _worse_than(first, exact, points, patch)
     alike = (worse <= turn.undecided * doubt) & (_angles(T, T[first]) >= turn.apart)
     best = placed if first == 0 else replace(placed, T_cam_model=T[first])
@@ -127,11 +128,11 @@ def _worse_than(first: int, distances: Array, points: Array, patch: float) -> tu
     return mean, np.sqrt((sums**2).sum(axis=1)) / len(points)
 
 
-def _as_much_allowed(
+def _as_much_explained(
     T: Array, placed: Hypothesis, verifier: Verifier, config: SearchConfig
 ) -> NDArray[np.bool_]:
-    """(K,) whether free space, the table and colours speak no more against each placement than
-    against the first."""
+    """(K,) whether free space and the table speak no more against each placement than against the
+    first."""
     score = verifier.score(
         T,
         placed.model,
@@ -139,11 +140,18 @@ def _as_much_allowed(
         model_points=config.fine_points,
         seen_points=config.fine_points,
     )
-    allowed = score >= score[0] - config.turn.alike
-    if placed.model.stored.record.get("coloured"):
-        colour = config.colour
-        agreement = np.array(
-            [textured_agreement(each, placed.model, verifier.frame, colour) for each in T]
-        )
-        allowed &= colour.worth * (agreement - agreement[0]) >= -colour.gain
-    return np.asarray(allowed)
+    return np.asarray(score >= score[0] - config.turn.alike)
+
+
+def _as_much_alike(
+    T: Array, placed: Hypothesis, verifier: Verifier, config: SearchConfig
+) -> NDArray[np.bool_]:
+    """(K,) whether the image's colours speak no more against each placement than against the
+    first."""
+    if not placed.model.stored.record.get("coloured"):
+        return np.ones(len(T), dtype=np.bool_)
+    colour = config.colour
+    agreement = np.array(
+        [textured_agreement(each, placed.model, verifier.frame, colour) for each in T]
+    )
+    return np.asarray(colour.worth * (agreement - agreement[0]) >= -colour.gain)

@@ -158,8 +158,7 @@ def _around_stored_mesh(
     moved = np.einsum("ni,ni->n", best.vertices - through.vertices, through.normals)
     # Where a vertex is a corner, its faces move by less than itself.
     corners = band * shape.shape.corners
-    # Of placements turned otherwise none is probable by itself: half of the band is theirs.
-    reach = moved + np.maximum(corners, reach_of_alike(shape) + corners / 2)
+    reach = moved + corners + reach_of_alike(shape)
     axes = around_axes(shape, float(reach.max()) + margin, config)
     beyond = beyond_reach(shape, reach, axes, margin)
     if margin > 0:
