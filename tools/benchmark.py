@@ -15,7 +15,7 @@ processors multiply 20 times more slowly and others at full speed, are counted b
 brrp_cli that made them. With --json a line is appended.
 
 A set is a folder of frames (*.npz) or of scenes, whose first views are taken: one row of a table
-over its frames. Frames without masks get them, and the time counts. `busy` is how many times as
+over its frames. With --make-masks, masks are made of depth, and the time counts. `busy` is how many times as
 many CPU seconds one thread takes where the other cores are kept busy.
 """
 
@@ -81,6 +81,7 @@ class Options:
 @click.option(
     "--set-frames", default=6, show_default=True, type=click.IntRange(1), help="Of a set."
 )
+@click.option("--make-masks", is_flag=True, help="Those of sets, anew.")
 @click.option("--quick", is_flag=True, help="One repeat, one plain object, less growth.")
 @click.option("--json", "history", type=click.Path(path_type=Path), help="Append a line here.")
 def main(
@@ -94,6 +95,7 @@ def main(
     growth: bool,
     sets: tuple[str, ...],
     set_frames: int,
+    make_masks: bool,
     quick: bool,
     history: Path | None,
 ) -> None:
@@ -121,7 +123,7 @@ def main(
             "frames": [measure(n, f, prior, machine, options) for n, f in frames.items()],
         }
         if sets:
-            record["sets"] = measure_sets(sets, set_frames, prior, options)
+            record["sets"] = measure_sets(sets, set_frames, make_masks, prior, options)
         if growth and frames:
             record["growth"] = measure_growth(next(iter(frames.values())), prior, options, quick)
     except BrrpError as error:
@@ -228,7 +230,7 @@ def _cold(frame: Frame, prior: Prior) -> dict[str, float]:
 
 
 def measure_sets(
-    sets: tuple[str, ...], most: int, prior: Prior, options: Options
+    sets: tuple[str, ...], most: int, make_masks: bool, prior: Prior, options: Options
 ) -> list[dict[str, Any]]:
     """A row for each NAME=FOLDER; prints them and returns them for JSON."""
     click.echo(f"\n{HEAD}")
@@ -238,7 +240,7 @@ def measure_sets(
             raise click.UsageError(f"--set {name}: write NAME=FOLDER")
         found = measure_set(
             name,
-            frames_of(Path(folder), most),
+            frames_of(Path(folder), most, masks=not make_masks),
             prior,
             options.workers,
             options.repeats,

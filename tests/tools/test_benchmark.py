@@ -132,6 +132,7 @@ def test_a_set_is_the_frames_of_a_folder(frame, tmp_path):
     for name in "cab":
         save_frame(with_objects(frame, 1 + (name == "a")), tmp_path / f"{name}.npz")
     assert [len(each.object_ids) for each in frames_of(tmp_path, 2)] == [2, 1]
+    assert frames_of(tmp_path, 1, masks=False)[0].object_ids == []
     (tmp_path / "none").mkdir()
     with pytest.raises(SceneError, match="none"):
         frames_of(tmp_path / "none", 2)

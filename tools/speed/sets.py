@@ -6,14 +6,14 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 from plain.reconstruct import STAGES, reconstruct_plainly
 
 from brrp_cli.config import preset
-from brrp_cli.frames.frame import Frame
+from brrp_cli.frames.frame import BACKGROUND, Frame
 from brrp_cli.frames.readers import read_frame
 from brrp_cli.ground_truth.scenes import find_scenes
 from brrp_cli.prior.store import Prior
@@ -60,15 +60,20 @@ class SetRow:
         )
 
 
-def frames_of(folder: Path, most: int) -> list[Frame]:
-    """The frames FOLDER/*.npz, or else the first view of each scene in it, `most` at most.
+def frames_of(folder: Path, most: int, *, masks: bool = True) -> list[Frame]:
+    """The frames FOLDER/*.npz, or else the first view of each scene in it, `most` at most; without
+    `masks` those that they have are dropped.
 
     Errors: FrameError, SceneError.
     """
     paths = sorted(folder.glob("*.npz"))[:most]
     if paths:
-        return [read_frame(path) for path in paths]
-    return [scene.view(0) for scene in find_scenes(folder)[:most]]
+        frames = [read_frame(path) for path in paths]
+    else:
+        frames = [scene.view(0) for scene in find_scenes(folder)[:most]]
+    if masks:
+        return frames
+    return [replace(frame, segmap=np.full_like(frame.segmap, BACKGROUND)) for frame in frames]
 
 
 def measure_set(
