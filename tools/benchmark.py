@@ -15,8 +15,8 @@ processors multiply 20 times more slowly and others at full speed, are counted b
 brrp_cli that made them. With --json a line is appended.
 
 A set is a folder of frames (*.npz) or of scenes, whose first views are taken: one row of a table
-over its frames. With --make-masks, masks are made of depth, and the time counts. `busy` is how many times as
-many CPU seconds one thread takes where the other cores are kept busy.
+over its frames. With --make-masks, masks are made of depth, and the time counts. `busy` is how many
+times as many CPU seconds one thread takes where the other cores are kept busy.
 """
 
 from __future__ import annotations
