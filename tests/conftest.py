@@ -1,6 +1,10 @@
 import logging
+import multiprocessing
+from multiprocessing.forkserver import ensure_running
 
 import pytest
+
+from brrp_cli.executors import processes
 
 pytest_plugins = ["pointsdf_fixtures", "starter_fixtures", "table_fixtures"]
 
@@ -11,6 +15,20 @@ def no_clip_of_the_users(tmp_path_factory: pytest.TempPathFactory):
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("XDG_CACHE_HOME", str(tmp_path_factory.mktemp("cache")))
         patch.delenv("BRRP_CLIP_DIR", raising=False)
+        yield
+
+
+@pytest.fixture(scope="session", autouse=True)
+def workers_are_forked(no_clip_of_the_users):
+    """Worker processes come from one that has loaded the libraries: to load them takes a process of
+    its own three seconds. Tests of the processes themselves, and commands that are run in a process
+    of their own, start them as users do."""
+    # What makes an object of a prior, and what measures one.
+    modules = ["open3d", "torch", "brrp_cli.prior.build.build", "brrp_cli.evaluation.work"]
+    multiprocessing.set_forkserver_preload(modules)
+    ensure_running()
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(processes, "START", "forkserver")
         yield
 
 

@@ -24,6 +24,8 @@ PATIENCE = 5.0
 # Seconds without a task at work after which it is asked whether processes start at all, and what
 # one that does nothing may take.
 _START, _PROBE = 10.0, 60.0
+# How a process starts, in the words of `multiprocessing`: afresh, for threads do not survive a fork.
+START = "spawn"
 ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
 
@@ -87,7 +89,7 @@ def _results(
 
 def require_processes() -> None:
     """BrrpError unless a process that does nothing starts and ends well."""
-    process = multiprocessing.get_context("spawn").Process(target=_nothing)
+    process = multiprocessing.get_context(START).Process(target=_nothing)
     try:
         process.start()
     except OSError as error:
@@ -119,7 +121,7 @@ def cannot_start(found: object) -> BrrpError:
 def _pool(workers: int) -> Any:
     import pebble
 
-    context = multiprocessing.get_context("spawn")
+    context = multiprocessing.get_context(START)
     return pebble.ProcessPool(workers, initializer=_end_once, context=context)
 
 
