@@ -1,10 +1,14 @@
 import logging
 import multiprocessing
+import os
 from multiprocessing.forkserver import ensure_running
 
 import pytest
 
 from brrp_cli.executors import processes
+
+# Dask's workers too, see `workers_are_forked`; read when Dask is imported.
+os.environ["DASK_DISTRIBUTED__WORKER__MULTIPROCESSING_METHOD"] = "forkserver"
 
 pytest_plugins = ["pointsdf_fixtures", "starter_fixtures", "table_fixtures"]
 
@@ -24,7 +28,8 @@ def workers_are_forked(no_clip_of_the_users):
     its own three seconds. Tests of the processes themselves, and commands that are run in a process
     of their own, start them as users do."""
     # What makes an object of a prior, and what measures one.
-    modules = ["open3d", "torch", "brrp_cli.prior.build.build", "brrp_cli.evaluation.work"]
+    modules = ["open3d", "torch", "distributed", "brrp_cli.api", "brrp_cli.evaluation.run"]
+    modules += ["brrp_cli.prior.build.build"]
     multiprocessing.set_forkserver_preload(modules)
     ensure_running()
     with pytest.MonkeyPatch.context() as patch:
