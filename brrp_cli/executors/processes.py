@@ -24,7 +24,7 @@ PATIENCE = 5.0
 # Seconds without a task at work after which it is asked whether processes start at all, and what
 # one that does nothing may take.
 _START, _PROBE = 10.0, 60.0
-# How a process starts, in the words of `multiprocessing`: afresh, for threads do not survive a fork.
+# How processes start, in the words of `multiprocessing`: afresh, for no thread survives a fork.
 START = "spawn"
 ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
