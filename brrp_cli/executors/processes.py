@@ -15,7 +15,7 @@ from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from multiprocessing.util import is_exiting
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 from brrp_cli.errors import BrrpError, unexpected
 
@@ -25,7 +25,7 @@ PATIENCE = 5.0
 # one that does nothing may take.
 _START, _PROBE = 10.0, 60.0
 # How processes start, in the words of `multiprocessing`: afresh, for no thread survives a fork.
-START: Literal["spawn", "forkserver"] = "spawn"
+START = "spawn"
 ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
 
@@ -89,7 +89,8 @@ def _results(
 
 def require_processes() -> None:
     """BrrpError unless a process that does nothing starts and ends well."""
-    process = multiprocessing.get_context(START).Process(target=_nothing)
+    context: Any = multiprocessing.get_context(START)
+    process = context.Process(target=_nothing)
     try:
         process.start()
     except OSError as error:

@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from brrp_cli.grasping.gripper import Gripper
 from brrp_cli.observation.support_plane import Plane
-from brrp_cli.planning.numbers import quaternion_wxyz
 from grasp_trial.bodies import TrueBody
 from grasp_trial.world import STEP, back_along, world_xml
 
@@ -141,7 +140,7 @@ class Trials:
     def _place(self, data: Any, T: Array, opening: float) -> None:
         """Put the hand there, at rest, open by `opening`."""
         self._move(data, T)
-        data.joint("hand").qpos[:] = [*T[:3, 3], *quaternion_wxyz(T[:3, :3])]
+        data.joint("hand").qpos[:] = [*data.mocap_pos[0], *data.mocap_quat[0]]
         bend = (self.gripper.opening - opening) / 2
         for name in ("left", "right"):
             data.joint(name).qpos[0] = bend
@@ -150,7 +149,7 @@ class Trials:
 
     def _move(self, data: Any, T: Array) -> None:
         data.mocap_pos[0] = T[:3, 3]
-        data.mocap_quat[0] = quaternion_wxyz(T[:3, :3])
+        self.mj.mju_mat2Quat(data.mocap_quat[0], T[:3, :3].ravel())
 
     def _run(self, data: Any, seconds: float, way: Callable[[float], Array] | None = None) -> None:
         steps = round(seconds / STEP)
@@ -180,6 +179,17 @@ def _at(xyz: Sequence[float]) -> Array:
 
 def _smooth(s: float) -> float:
     return s * s * (3 - 2 * s)
+
+
+def misplaced(T: Array, accuracy: float, angle: float, rng: np.random.Generator) -> Array:
+    """T_world_gripper of a robot that misses its pose T by normal errors along and about each axis
+    of the hand: standard deviations in metres and degrees, as the planner's score counts them."""
+    from scipy.spatial.transform import Rotation
+
+    off = np.eye(4)
+    off[:3, :3] = Rotation.from_rotvec(rng.normal(0, np.deg2rad(angle), 3)).as_matrix()
+    off[:3, 3] = rng.normal(0, accuracy, 3)
+    return np.asarray(T @ off)
 
 
 def _shaken(T: Array, s: float) -> Array:
