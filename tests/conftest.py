@@ -31,7 +31,10 @@ def workers_are_forked(no_clip_of_the_users):
     modules = ["open3d", "torch", "distributed", "brrp_cli.api", "brrp_cli.evaluation.run"]
     modules += ["brrp_cli.prior.build.build"]
     multiprocessing.set_forkserver_preload(modules)
-    ensure_running()
+    with pytest.MonkeyPatch.context() as patch:
+        # Where the package is installed, it is loaded from there and not from this folder.
+        patch.setenv("PYTHONSAFEPATH", "1")
+        ensure_running()
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(processes, "START", "forkserver")
         yield

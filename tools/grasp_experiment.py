@@ -29,7 +29,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from grasp_trial.bodies import true_body
 from grasp_trial.film import Film, Take
-from grasp_trial.methods import DEFAULT, METHODS, scenes_of
+from grasp_trial.methods import DEFAULT, METHODS, POINTSDF, scenes_of
 from grasp_trial.report import report
 from grasp_trial.trial import Trials, misplaced
 
@@ -57,7 +57,8 @@ DRIFT = 0.005  # metres
 @click.argument("sets", nargs=-1, metavar="NAME=SCENES...")
 @click.option("--prior", "prior_path", type=click.Path(path_type=Path))
 @click.option("--data-root", type=click.Path(path_type=Path), help="Mesh paths are relative to it.")
-@click.option("--methods", default=",".join(METHODS), show_default=True)
+@click.option("--methods", default=",".join(METHODS), show_default=True, help="Also pointsdf.")
+@click.option("--weights", type=click.Path(path_type=Path), help="Of pointsdf.")
 @click.option("--gripper", default=HAND, show_default=True)
 @click.option("--friction", default=GraspConfig.friction, show_default=True, help="Of both.")
 @click.option("--first", type=click.IntRange(1), help="Scenes of each set.")
@@ -71,6 +72,7 @@ def main(
     prior_path: Path | None,
     data_root: Path | None,
     methods: str,
+    weights: Path | None,
     gripper: str,
     friction: float,
     first: int | None,
@@ -85,8 +87,9 @@ def main(
         click.echo(report(_rows(report_of), DRIFT))
         return
     chosen = tuple(name.strip() for name in methods.split(","))
-    if output is None or not sets or set(chosen) - set(METHODS):
-        raise click.UsageError(f"name sets, -o FILE, and --methods of {', '.join(METHODS)}")
+    known = METHODS if weights is None else (*METHODS, POINTSDF)
+    if output is None or not sets or set(chosen) - set(known):
+        raise click.UsageError(f"name sets, -o FILE, and --methods of {', '.join(known)}")
     film = None if film_of is None else Film()
     try:
         prior, retriever = _open(prior_path, seed)
@@ -112,6 +115,7 @@ def main(
                         cache or truth_cache(),
                         prior,
                         retriever,
+                        weights,
                         film,
                     )
                 )
@@ -153,6 +157,7 @@ def _scene_rows(
     cache: Path,
     prior: Any,
     retriever: Any,
+    weights: Path | None,
     film: Film | None,
 ) -> Iterator[dict[str, Any]]:
     """A row for each grasp that is carried out, and for each object without one."""
@@ -160,7 +165,7 @@ def _scene_rows(
     assert frame.T_world_cam is not None
     bodies = [true_body(item, data_root, cache) for item in scene.objects]
     trials = Trials(bodies, hand, friction)
-    told = scenes_of(methods, frame, bodies, prior, retriever, seed)
+    told = scenes_of(methods, frame, bodies, prior, retriever, seed, weights)
     config = replace(GraspConfig(), friction=friction)
     seen = [i for i in frame.object_ids if int((frame.segmap == i).sum()) >= MIN_PIXELS]
     for method, view in told.items():
