@@ -146,8 +146,8 @@ def test_a_file_configures_it_everywhere(registered, place):
     assert iou["tight+mine", "9"] == iou["half+mine", "9"]
 
 
-def test_help_tells_of_it(registered):
-    text = " ".join(CliRunner().invoke(main, ["reconstruct", "--help"]).output.split())
+def test_help_tells_of_it(place):
+    text = " ".join(command(place, "reconstruct", "--help").stdout.split())
     assert "sphere: a ball around each object; needs nothing but a frame." in text
 
 
