@@ -50,7 +50,8 @@ PER_OBJECT = 40
 # Ranks of the grasps that are carried out, best first; another one may be drawn.
 RANKS = (1, 2, 3)
 DRAWN = "drawn"
-DRIFT = 0.005  # metres
+# Of an object that does not stand by itself no grasp is counted, metres.
+DRIFT = 0.005
 
 
 @click.command()

@@ -75,6 +75,18 @@ def test_what_happens_is_told(trials, T, result):
     assert found.result == result
 
 
+def test_what_falls_over_by_itself_is_told():
+    """On its edge, 5 degrees off balance: it has hardly moved when the hand comes."""
+    tilted = standing(1, 0.0, (0.05, 0.05, 0.1))
+    angle = np.deg2rad(45 + 5)
+    tilted.T_world_object[:3, :3] = Rotation.from_rotvec([angle, 0, 0]).as_matrix()
+    corners = tilted.mesh.vertices @ tilted.T_world_object[:3, :3].T
+    tilted.T_world_object[2, 3] = -corners[:, 2].min()
+    still = standing(2, 0.3, (0.05, 0.05, 0.1))
+    drift = Trials([tilted, still], FRANKA, 0.5).drift
+    assert drift[1] > 0.01 and drift[2] < 0.001
+
+
 def test_a_wedge_slips_out():
     """Its sides lean by 40 degrees, half of it each; the friction cone has 17."""
     wedge = solids.box(0.05, 0.005, 0.06)

@@ -16,8 +16,8 @@ Row = dict[str, Any]
 
 
 def report(rows: Sequence[Row], drift: float) -> str:
-    """Markdown. Objects that moved by more than `drift` metres before any hand came are left out:
-    their convex parts do not stand where the true mesh does."""
+    """Markdown. Objects that move by more than `drift` metres without any hand are left out: they
+    do not stand as the scene has them, which was settled with their convex hulls."""
     rows = [row for row in rows if row["drift"] is None or row["drift"] <= drift]
     rng = np.random.default_rng(0)
     sets = list(dict.fromkeys(row["set"] for row in rows))

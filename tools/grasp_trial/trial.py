@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from brrp_cli.geometry import transform_points
 from brrp_cli.grasping.gripper import Gripper
 from brrp_cli.observation.support_plane import Plane
 from grasp_trial.bodies import TrueBody
@@ -31,11 +32,14 @@ SHAKES, ASIDE, TURN = 3.0, 0.03, np.deg2rad(15)  # Hz, metres, radians
 # Of what is held: it rose by so much of the lift.
 ROSE = 0.6
 TABLE = Plane(np.array([0.0, 0.0, 1.0]), 0.0)
+# T_world_gripper of a hand that is in nobody's way, 2 m over the table.
+AWAY = np.array([[1.0, 0, 0, 0], [0, -1, 0, 0], [0, 0, -1, 2], [0, 0, 0, 1]])
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """result : one of OUTCOMES; drift : metres that the object moved before the hand came."""
+    """result : one of OUTCOMES; drift : metres that a point of the object moves at most, if no hand
+    comes, until it would be lifted."""
 
     result: str
     drift: float
@@ -51,11 +55,13 @@ class Trials:
         self.model = mujoco.MjModel.from_xml_string(world_xml(bodies, gripper, friction))
         self.start = mujoco.MjData(self.model)
         self.ids = [body.object_id for body in bodies]
-        self._place(self.start, np.diag([1.0, -1.0, -1.0, 1.0]) + _at([0, 0, 2]), gripper.opening)
+        self._place(self.start, AWAY, gripper.opening)
         self._run(self.start, SETTLE)
-        first = np.array([body.T_world_object[:3, 3] for body in bodies])
-        moved = np.array([self._where(self.start, i) for i in self.ids]) - first
-        self.drift = dict(zip(self.ids, np.linalg.norm(moved, axis=1).tolist(), strict=True))
+        left_alone = mujoco.MjData(self.model)
+        left_alone.qpos[:] = self.start.qpos
+        self._place(left_alone, AWAY, gripper.opening)
+        self._run(left_alone, APPROACH + CLOSE)
+        self.drift = {body.object_id: _moved(body, left_alone) for body in bodies}
 
     def attempt(
         self,
@@ -169,6 +175,16 @@ class Trials:
 
     def _body_of(self, geom: int) -> str:
         return str(self.model.body(self.model.geom_bodyid[geom]).name)
+
+
+def _moved(body: TrueBody, data: Any) -> float:
+    """Metres that the furthest moved point of an object is from where the scene has it."""
+    now = data.body(f"object_{body.object_id}")
+    corners = np.concatenate(body.parts)
+    there = corners @ now.xmat.reshape(3, 3).T + now.xpos
+    return float(
+        np.linalg.norm(there - transform_points(body.T_world_object, corners), axis=1).max()
+    )
 
 
 def _at(xyz: Sequence[float]) -> Array:
