@@ -1,6 +1,14 @@
 import logging
+import multiprocessing
+import os
+from multiprocessing.forkserver import ensure_running
 
 import pytest
+
+from brrp_cli.executors import processes
+
+# Dask's workers too, see `workers_are_forked`; read when Dask is imported.
+os.environ["DASK_DISTRIBUTED__WORKER__MULTIPROCESSING_METHOD"] = "forkserver"
 
 pytest_plugins = ["pointsdf_fixtures", "starter_fixtures", "table_fixtures"]
 
@@ -11,6 +19,24 @@ def no_clip_of_the_users(tmp_path_factory: pytest.TempPathFactory):
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("XDG_CACHE_HOME", str(tmp_path_factory.mktemp("cache")))
         patch.delenv("BRRP_CLIP_DIR", raising=False)
+        yield
+
+
+@pytest.fixture(scope="session", autouse=True)
+def workers_are_forked(no_clip_of_the_users):
+    """Worker processes come from one that has loaded the libraries: to load them takes a process of
+    its own three seconds. Tests of the processes themselves, and commands that are run in a process
+    of their own, start them as users do."""
+    # What makes an object of a prior, and what measures one.
+    modules = ["open3d", "torch", "distributed", "brrp_cli.api", "brrp_cli.evaluation.run"]
+    modules += ["brrp_cli.prior.build.build"]
+    multiprocessing.set_forkserver_preload(modules)
+    with pytest.MonkeyPatch.context() as patch:
+        # Where the package is installed, it is loaded from there and not from this folder.
+        patch.setenv("PYTHONSAFEPATH", "1")
+        ensure_running()
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(processes, "START", "forkserver")
         yield
 
 

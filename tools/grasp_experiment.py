@@ -4,11 +4,13 @@
     python tools/grasp_experiment.py prior=SCENES --prior prior/ --data-root data/ -o grasps.jsonl
     python tools/grasp_experiment.py --report grasps.jsonl
 
-For each object: the best grasp of each method, and of `default` another one, drawn at random among
-those that it plans, so that low scores are tried as well. A floating hand of boxes with limited
-force comes in from the pre-grasp, closes, lifts by 20 cm and shakes, open loop. A grasp holds if
-the object is still in the hand at the end. Rows that are there are not made again. --film draws
-the first grasps of this run that held, and the first that failed in each way.
+For each object: the three best grasps of each method, which the planner keeps apart, and of
+`default` another one, drawn at random among those that it plans, so that low scores are tried as
+well. A floating hand of boxes with limited force comes in from the pre-grasp, closes, lifts by
+20 cm and shakes, open loop. It misses its pose by as much as the planner's score counts with; the
+same errors for all methods. A grasp holds if the object is still in the hand at the end. A scene
+and method of which there are rows is not run again: what was stopped goes on, and methods may come
+later. --film draws the first grasps of this run that held, and the first that failed in each way.
 """
 
 from __future__ import annotations
@@ -27,9 +29,9 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from grasp_trial.bodies import true_body
 from grasp_trial.film import Film, Take
-from grasp_trial.methods import DEFAULT, METHODS, scenes_of
+from grasp_trial.methods import DEFAULT, METHODS, POINTSDF, scenes_of
 from grasp_trial.report import report
-from grasp_trial.trial import Trials
+from grasp_trial.trial import Trials, misplaced
 
 from brrp_cli.config.grasping import GraspConfig
 from brrp_cli.errors import BrrpError
@@ -45,14 +47,19 @@ from brrp_cli.seeds import child_rng
 # Fewer pixels of an object are no view of it.
 MIN_PIXELS = 200
 PER_OBJECT = 40
-DRIFT = 0.005  # metres
+# Ranks of the grasps that are carried out, best first; another one may be drawn.
+RANKS = (1, 2, 3)
+DRAWN = "drawn"
+# Of an object that does not stand by itself no grasp is counted, metres.
+DRIFT = 0.005
 
 
 @click.command()
 @click.argument("sets", nargs=-1, metavar="NAME=SCENES...")
 @click.option("--prior", "prior_path", type=click.Path(path_type=Path))
 @click.option("--data-root", type=click.Path(path_type=Path), help="Mesh paths are relative to it.")
-@click.option("--methods", default=",".join(METHODS), show_default=True)
+@click.option("--methods", default=",".join(METHODS), show_default=True, help="Also pointsdf.")
+@click.option("--weights", type=click.Path(path_type=Path), help="Of pointsdf.")
 @click.option("--gripper", default=HAND, show_default=True)
 @click.option("--friction", default=GraspConfig.friction, show_default=True, help="Of both.")
 @click.option("--first", type=click.IntRange(1), help="Scenes of each set.")
@@ -66,6 +73,7 @@ def main(
     prior_path: Path | None,
     data_root: Path | None,
     methods: str,
+    weights: Path | None,
     gripper: str,
     friction: float,
     first: int | None,
@@ -80,25 +88,27 @@ def main(
         click.echo(report(_rows(report_of), DRIFT))
         return
     chosen = tuple(name.strip() for name in methods.split(","))
-    if output is None or not sets or set(chosen) - set(METHODS):
-        raise click.UsageError(f"name sets, -o FILE, and --methods of {', '.join(METHODS)}")
+    known = METHODS if weights is None else (*METHODS, POINTSDF)
+    if output is None or not sets or set(chosen) - set(known):
+        raise click.UsageError(f"name sets, -o FILE, and --methods of {', '.join(known)}")
     film = None if film_of is None else Film()
     try:
         prior, retriever = _open(prior_path, seed)
         hand = open_gripper(gripper)
-        done = {(row["set"], row["scene"]) for row in _rows(output)}
+        done = {(row["scene"], row["method"]) for row in _rows(output)}
         for text in sets:
             name, _, folder = text.partition("=")
             for scene in find_scenes(Path(folder), slice(0, first)):
                 label = f"{name}/{scene.name}"
-                if (name, label) in done:
+                missing = tuple(method for method in chosen if (label, method) not in done)
+                if not missing:
                     continue
                 start = time.perf_counter()
                 rows = list(
                     _scene_rows(
                         scene,
                         name,
-                        chosen,
+                        missing,
                         hand,
                         friction,
                         seed,
@@ -106,6 +116,7 @@ def main(
                         cache or truth_cache(),
                         prior,
                         retriever,
+                        weights,
                         film,
                     )
                 )
@@ -147,6 +158,7 @@ def _scene_rows(
     cache: Path,
     prior: Any,
     retriever: Any,
+    weights: Path | None,
     film: Film | None,
 ) -> Iterator[dict[str, Any]]:
     """A row for each grasp that is carried out, and for each object without one."""
@@ -154,7 +166,7 @@ def _scene_rows(
     assert frame.T_world_cam is not None
     bodies = [true_body(item, data_root, cache) for item in scene.objects]
     trials = Trials(bodies, hand, friction)
-    told = scenes_of(methods, frame, bodies, prior, retriever, seed)
+    told = scenes_of(methods, frame, bodies, prior, retriever, seed, weights)
     config = replace(GraspConfig(), friction=friction)
     seen = [i for i in frame.object_ids if int((frame.segmap == i).sum()) >= MIN_PIXELS]
     for method, view in told.items():
@@ -171,30 +183,35 @@ def _scene_rows(
                 "scene": f"{name}/{scene.name}",
                 "object": object_id,
                 "method": method,
-                "rank": "best",
                 "plan_cpu_seconds": seconds,
             }
             if not grasps:
                 why = of[object_id].why if object_id in of else "it has no mesh"
-                yield row | {"result": "none", "why": why, "score": None, "drift": None}
+                none = {"result": "none", "why": why, "score": None, "drift": None}
+                yield row | {"rank": RANKS[0]} | none
                 continue
-            yield row | _carried_out(trials, grasps[0], frame.T_world_cam, config, method, film)
-            if method == DEFAULT and len(grasps) > 1:
+            tried: dict[int | str, Grasp] = dict(zip(RANKS, grasps, strict=False))
+            if method == DEFAULT and len(grasps) > len(RANKS):
                 rng = child_rng(seed, "trial", scene.name, object_id)
-                other = grasps[int(rng.integers(1, len(grasps)))]
-                tried = _carried_out(trials, other, frame.T_world_cam, config, method, film)
-                yield row | {"rank": "drawn"} | tried
+                tried[DRAWN] = grasps[int(rng.integers(len(RANKS), len(grasps)))]
+            for rank, grasp in tried.items():
+                T = misplaced(
+                    frame.T_world_cam @ grasp.T_cam_gripper,
+                    config.accuracy,
+                    config.accuracy_angle,
+                    child_rng(seed, "miss", scene.name, object_id, rank),
+                )
+                yield row | {"rank": rank} | _carried_out(trials, grasp, T, config, method, film)
 
 
 def _carried_out(
     trials: Trials,
     grasp: Grasp,
-    T_world_cam: Any,
+    T: Any,
     config: GraspConfig,
     method: str,
     film: Film | None,
 ) -> dict[str, Any]:
-    T = T_world_cam @ grasp.T_cam_gripper
     take = Take(trials.model, f"object_{grasp.object_id}", (T @ [0, 0, trials.gripper.tip, 1])[:3])
     outcome = trials.attempt(grasp.object_id, T, grasp.opening, config.approach, take)
     if film is not None and outcome.drift <= DRIFT and film.wants(outcome.result):

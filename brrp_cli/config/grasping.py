@@ -26,7 +26,8 @@ class GraspConfig:
     clearance : the hand comes in open so much further than the pair is apart, on each side, where
     its opening allows it
     approach : straight way in, from the pre-grasp
-    table_gap : least height over the table; inset : by which the boxes of the hand are smaller
+    table_gap : least height over the table, some standard deviations of where the hand gets to;
+    inset : by which the boxes of the hand are smaller
     where they are held against the object and its neighbours, which were measured with noise
 
     Score
@@ -62,7 +63,7 @@ class GraspConfig:
     candidates: int = 250
     clearance: float = 0.015
     approach: float = 0.1
-    table_gap: float = 0.002
+    table_gap: float = 0.003
     inset: float = 0.0005
     draws: int = 24
     surfaces: int = 12

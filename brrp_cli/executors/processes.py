@@ -24,6 +24,8 @@ PATIENCE = 5.0
 # Seconds without a task at work after which it is asked whether processes start at all, and what
 # one that does nothing may take.
 _START, _PROBE = 10.0, 60.0
+# How processes start, in the words of `multiprocessing`: afresh, for no thread survives a fork.
+START = "spawn"
 ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
 
@@ -87,7 +89,8 @@ def _results(
 
 def require_processes() -> None:
     """BrrpError unless a process that does nothing starts and ends well."""
-    process = multiprocessing.get_context("spawn").Process(target=_nothing)
+    context: Any = multiprocessing.get_context(START)
+    process = context.Process(target=_nothing)
     try:
         process.start()
     except OSError as error:
@@ -119,7 +122,7 @@ def cannot_start(found: object) -> BrrpError:
 def _pool(workers: int) -> Any:
     import pebble
 
-    context = multiprocessing.get_context("spawn")
+    context = multiprocessing.get_context(START)
     return pebble.ProcessPool(workers, initializer=_end_once, context=context)
 
 

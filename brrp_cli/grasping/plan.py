@@ -24,6 +24,7 @@ from brrp_cli.grasping.gripper_file import DEFAULT, open_gripper
 from brrp_cli.grasping.obstacles import Obstacles
 from brrp_cli.grasping.options import ALL, APPROACHES, CONE, MIN_SCORE, PER_OBJECT, TOP_DOWN
 from brrp_cli.grasping.scene import GraspObject, GraspScene, scene_of
+from brrp_cli.observation.support_plane import Plane
 from brrp_cli.reconstruction import Reconstruction
 from brrp_cli.results.read import StoredResult
 from brrp_cli.seeds import child_rng
@@ -124,7 +125,8 @@ def _plan_object(task: _Task) -> ObjectGrasps:
     poses = _most_promising(item, own, poses, gripper, config, fell)
     off = _misplacements(config, rng)
     closed = close_on(surfaces, poses.T, poses.openings, gripper, config, off)
-    return _ranked(task, poses, closed, obstacles, fell)
+    low = _on_the_table(poses, off, scene.plane, gripper)
+    return _ranked(task, poses, closed, low, obstacles, fell)
 
 
 def _pairs(
@@ -221,19 +223,41 @@ def _misplacements(config: GraspConfig, rng: np.random.Generator) -> Array:
     return T
 
 
+def _on_the_table(
+    poses: Poses, off: Array, plane: Plane | None, gripper: Gripper
+) -> NDArray[np.bool_]:
+    """(S, n): whether each hand touches the table where it gets to in each draw."""
+    low = np.zeros((len(off), len(poses)), dtype=bool)
+    if plane is not None and len(poses):
+        for draw, move in enumerate(off):
+            low[draw] = gripper.lowest(poses.T @ move, poses.openings, plane) < 0
+    return low
+
+
 def _ranked(
-    task: _Task, poses: Poses, closed: Closed, obstacles: Obstacles, fell: dict[str, int]
+    task: _Task,
+    poses: Poses,
+    closed: Closed,
+    low: NDArray[np.bool_],
+    obstacles: Obstacles,
+    fell: dict[str, int],
 ) -> ObjectGrasps:
     """The best grasps that are far enough from each other and that no neighbour is in the way of,
     exactly."""
     config, item = task.config, task.item
-    score = closed.holds.mean(axis=0)
+    score = (closed.holds & ~low).mean(axis=0)
     quality = _quality(poses, closed, item, config)
     enough = score >= max(task.min_score, 1e-9)
-    causes = {"object": closed.collides, "missed": closed.misses, "friction": closed.slips}
+    causes = {
+        "object": closed.collides,
+        "missed": closed.misses,
+        "friction": closed.slips,
+        "table": low,
+    }
     share = np.stack([cause.mean(axis=0) for cause in causes.values()])
     worst = share.argmax(axis=0) if share.size else np.zeros(0, int)
-    fell |= {why: int((~enough & (worst == i)).sum()) for i, why in enumerate(causes)}
+    for i, why in enumerate(causes):
+        fell[why] = fell.get(why, 0) + int((~enough & (worst == i)).sum())
     fell |= {"similar": 0, "more": 0}
     grasps: list[Grasp] = []
     for i in np.lexsort([-quality, -score]):

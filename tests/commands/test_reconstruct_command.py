@@ -20,7 +20,7 @@ from brrp_cli.errors import PriorError
 from brrp_cli.frames.npz import save_frame
 from brrp_cli.geometry import transform_points
 from brrp_cli.prior.build.build import build_prior
-from brrp_cli.prior.parameters import BuildParameters
+from brrp_cli.prior.parameters import AppearanceConfig, BuildParameters
 from brrp_cli.raycast import inside, look
 from brrp_cli.retrieval.choose import choose_retriever
 from brrp_cli.shapes import kinds, solids
@@ -78,7 +78,11 @@ def prior(tmp_path_factory) -> Path:
     can().export(meshes / "can.ply")
     bottle().export(meshes / "bottle.ply")
     out = tmp_path_factory.mktemp("prior") / "prior"
-    build_prior(meshes, out, BuildParameters(samples=4000, surface_points=1500), workers=1)
+    looks = AppearanceConfig(views=8, rays=500)
+    parameters = BuildParameters(
+        samples=4000, surface_points=1500, dense_points=5000, appearance=looks
+    )
+    build_prior(meshes, out, parameters, workers=1)
     return out
 
 

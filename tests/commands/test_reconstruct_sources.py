@@ -10,10 +10,12 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 from PIL import Image
+from sphere_method import METHOD
 from table_scene import T_CAM_WORLD, K, in_camera, photograph
 
 from brrp_cli.cli import main
 from brrp_cli.frames.npz import load_frame
+from brrp_cli.methods.registry import METHODS
 from brrp_cli.shapes import solids
 
 
@@ -35,8 +37,14 @@ def images(tmp_path_factory):
     return folder
 
 
-def run(*arguments):
-    return CliRunner().invoke(main, ["reconstruct", *map(str, arguments), "--method", "vprism"])
+@pytest.fixture
+def sphere(monkeypatch):
+    """The quickest method, where it does not matter which one it is."""
+    monkeypatch.setitem(METHODS, METHOD.name, METHOD)
+
+
+def run(*arguments, method="sphere"):
+    return CliRunner().invoke(main, ["reconstruct", *map(str, arguments), "--method", method])
 
 
 def files(folder):
@@ -46,7 +54,9 @@ def files(folder):
     ]  # fmt: skip
 
 
-def test_images_become_meshes_and_a_page_in_one_command(images, tmp_path, caplog, monkeypatch):
+def test_images_become_meshes_and_a_page_in_one_command(
+    images, sphere, tmp_path, caplog, monkeypatch
+):
     opened = []
     monkeypatch.setattr("webbrowser.open", lambda address: opened.append(address) or True)
     out = tmp_path / "out"
@@ -69,13 +79,13 @@ def test_images_become_meshes_and_a_page_in_one_command(images, tmp_path, caplog
     assert CliRunner().invoke(main, list(map(str, arguments))).exit_code == 0
     again = run(fixed)
     assert again.exit_code == 0, again.output
-    assert [path.name for path in (tmp_path / "fixed_vprism").glob("*.ply")] == ["object_2.ply"]
+    assert [path.name for path in (tmp_path / "fixed_sphere").glob("*.ply")] == ["object_2.ply"]
 
 
-def test_a_folder_becomes_meshes_beside_it(images):
+def test_a_folder_becomes_meshes_beside_it(images, sphere):
     result = run(images)
     assert result.exit_code == 0, result.output
-    assert (images.parent / "000000_vprism" / "result.json").is_file()
+    assert (images.parent / "000000_sphere" / "result.json").is_file()
     refused = run(images)
     assert refused.exit_code == 1
     assert "--overwrite" in refused.output
@@ -84,18 +94,20 @@ def test_a_folder_becomes_meshes_beside_it(images):
 def test_a_file_configures_masks_and_method_and_is_kept_with_the_result(images, tmp_path):
     path = tmp_path / "mine.toml"
     path.write_text("hinge_spacing = 0.06\n[segmentation]\nmin_area = 0.0009\n")
-    result = run(*files(images), "--config", path, "-o", tmp_path / "out")
+    result = run(*files(images), "--config", path, "-o", tmp_path / "out", method="vprism")
     assert result.exit_code == 0, result.output
     record = json.loads((tmp_path / "out" / "result.json").read_text())
     assert record["config"]["hinge_spacing"] == 0.06 and record["config"]["gamma"] == 1000.0
     assert record["segmentation"]["min_area"] == 0.0009
     assert record["segmentation"]["table"]["tolerance"] == 0.01
     path.write_text("[segmentation]\nmin_area = 1.0\n")
-    result = run(*files(images), "--config", path, "-o", tmp_path / "none")
+    result = run(*files(images), "--config", path, "-o", tmp_path / "none", method="vprism")
     assert result.exit_code == 1 and "Nothing stands on the table" in result.output
 
 
-def test_masks_that_are_given_are_used_and_a_page_may_stay_closed(images, tmp_path, monkeypatch):
+def test_masks_that_are_given_are_used_and_a_page_may_stay_closed(
+    images, sphere, tmp_path, monkeypatch
+):
     monkeypatch.setattr("webbrowser.open", lambda address: pytest.fail("it was opened"))
     out = tmp_path / "out"
     result = run(*files(images), "--masks", images / "m.png", "-o", out, "--html")
@@ -114,6 +126,6 @@ def test_masks_that_are_given_are_used_and_a_page_may_stay_closed(images, tmp_pa
     ],
 )
 def test_wrong_usage_is_exit_code_2(arguments, message):
-    result = run(*arguments)
+    result = run(*arguments, method="vprism")
     assert result.exit_code == 2
     assert message in result.output

@@ -19,7 +19,7 @@ import brrp_cli
 from brrp_cli.cli import main
 from brrp_cli.evaluation.rows import COLUMNS, COST, RowLog, finished
 from brrp_cli.prior.build.build import build_prior
-from brrp_cli.prior.parameters import BuildParameters
+from brrp_cli.prior.parameters import AppearanceConfig, BuildParameters
 
 GHOST = 7
 
@@ -31,7 +31,10 @@ def place(tmp_path_factory):
     meshes = write_meshes(folder / "data" / "shapes")
     write_scene(folder / "scenes" / "a", {9: ("can", 0.02, 0.03)})
     write_scene(folder / "scenes" / "b", {2: ("ball", 0.0, 0.0)}, yaw=2.0, ghost=GHOST)
-    parameters = BuildParameters(samples=1000, surface_points=500, dense_points=3000)
+    looks = AppearanceConfig(views=8, rays=500)
+    parameters = BuildParameters(
+        samples=1000, surface_points=500, dense_points=3000, appearance=looks
+    )
     build_prior(meshes, folder / "prior", parameters, workers=1)
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("XDG_CACHE_HOME", str(folder / "cache"))

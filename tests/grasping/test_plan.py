@@ -82,6 +82,16 @@ def test_hands_stay_above_the_table():
     assert flat.grasps == [] and flat.why
 
 
+def test_a_robot_that_misses_its_pose_may_touch_the_table_beside_what_lies_low():
+    """By a millimetre, where the fingers end as much over it."""
+    low, tall = (thing(solids.box(0.04, 0.1, height)) for height in (0.012, 0.1))
+    sure = GraspConfig(table_gap=0.001, accuracy=0.0, accuracy_angle=0.0)
+    assert grasps(low, config=sure).grasps[0].score == 1.0
+    near = GraspConfig(table_gap=0.001)
+    assert 0.5 < grasps(low, config=near).grasps[0].score < 1.0
+    assert grasps(tall, config=near).grasps[0].score == 1.0
+
+
 def test_top_down_comes_from_above_and_a_cone_from_around_it():
     box = thing(solids.box(0.05, 0.05, 0.12))
     down = axes(grasps(box, approach="top-down", per_object=100))[:, 2, 2]

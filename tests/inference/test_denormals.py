@@ -18,7 +18,7 @@ from speed.denormals import count_denormals, watch_denormals
 from brrp_cli import open_prior, reconstruct
 from brrp_cli.config import preset
 from brrp_cli.prior.build.build import build_prior
-from brrp_cli.prior.parameters import BuildParameters
+from brrp_cli.prior.parameters import AppearanceConfig, BuildParameters
 
 TINY = float(np.finfo(np.float32).smallest_normal)
 
@@ -48,7 +48,9 @@ def prior(tmp_path_factory):
     meshes = tmp_path_factory.mktemp("meshes")
     box().export(meshes / "box.ply")
     out = tmp_path_factory.mktemp("prior") / "prior"
-    build_prior(meshes, out, BuildParameters(samples=1000, dense_points=5000), workers=1)
+    looks = AppearanceConfig(views=8, rays=500)
+    parameters = BuildParameters(samples=1000, dense_points=5000, appearance=looks)
+    build_prior(meshes, out, parameters, workers=1)
     return open_prior(out)
 
 

@@ -15,7 +15,7 @@ from brrp_cli.demo.layout import turn
 from brrp_cli.geometry import similarity, transform_points
 from brrp_cli.ground_truth.surface_metrics import MeshSurface
 from brrp_cli.prior.build.build import build_prior
-from brrp_cli.prior.parameters import BuildParameters
+from brrp_cli.prior.parameters import AppearanceConfig, BuildParameters
 from brrp_cli.raycast import inside
 from brrp_cli.reconstruction import METRES, NO_SURFACE, OK
 from brrp_cli.retrieval.given import TruthRetriever
@@ -44,7 +44,9 @@ def folder(tmp_path_factory):
     box().export(meshes / "box.ply")
     can().export(meshes / "can.ply")
     out = tmp_path_factory.mktemp("prior") / "prior"
-    build_prior(meshes, out, BuildParameters(samples=1000, dense_points=5000), workers=1)
+    looks = AppearanceConfig(views=8, rays=500)
+    parameters = BuildParameters(samples=1000, dense_points=5000, appearance=looks)
+    build_prior(meshes, out, parameters, workers=1)
     return out
 
 

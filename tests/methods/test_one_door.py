@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 import sphere_method
 import trimesh
+from click.testing import CliRunner
 from sphere_method import METHOD, SphereConfig
 from tiny_scenes import write_meshes, write_scene
 
@@ -25,6 +26,7 @@ from brrp_cli import (
     read_frame,
     reconstruct,
 )
+from brrp_cli.cli import main
 from brrp_cli.config import preset
 from brrp_cli.errors import BrrpError
 from brrp_cli.methods.registry import METHODS
@@ -161,10 +163,6 @@ def test_help_tells_of_it(place):
     ],
 )
 def test_what_it_has_no_use_for_is_refused(registered, place, options, told):
-    from click.testing import CliRunner
-
-    from brrp_cli.cli import main
-
     frame = str(place / "scenes/a/0000")
     done = CliRunner().invoke(main, ["reconstruct", frame, "-o", str(place / "no"), *options])
     assert done.exit_code == 2 and told in " ".join(done.output.split())

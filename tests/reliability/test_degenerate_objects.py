@@ -16,7 +16,7 @@ from brrp_cli.errors import OutputError
 from brrp_cli.frames.build import make_frame
 from brrp_cli.frames.frame import Frame
 from brrp_cli.prior.build.build import build_prior
-from brrp_cli.prior.parameters import BuildParameters
+from brrp_cli.prior.parameters import AppearanceConfig, BuildParameters
 from brrp_cli.reconstruction import Reconstruction
 from brrp_cli.results.write import write_results
 
@@ -28,7 +28,11 @@ def prior(tmp_path_factory: pytest.TempPathFactory) -> Path:
     meshes = tmp_path_factory.mktemp("meshes")
     MESHES["box"]().export(meshes / "box.ply")
     out = tmp_path_factory.mktemp("prior") / "prior"
-    build_prior(meshes, out, BuildParameters(samples=1000, surface_points=500), workers=1)
+    looks = AppearanceConfig(views=8, rays=500)
+    parameters = BuildParameters(
+        samples=1000, surface_points=500, dense_points=5000, appearance=looks
+    )
+    build_prior(meshes, out, parameters, workers=1)
     return out
 
 

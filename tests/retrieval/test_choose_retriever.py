@@ -10,12 +10,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
+from small_prior import SMALL
 
 from brrp_cli.config import preset
 from brrp_cli.errors import RetrievalError
 from brrp_cli.frames.frame import Frame
 from brrp_cli.prior.build.build import build_prior
-from brrp_cli.prior.parameters import BuildParameters
 from brrp_cli.prior.store import Prior, open_prior
 from brrp_cli.retrieval.base import unknown
 from brrp_cli.retrieval.choose import choose_retriever, resolve_name
@@ -34,7 +34,7 @@ def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
     for colour in ("red", "green", "blue"):
         trimesh.creation.box((0.1, 0.12, 0.14)).export(meshes / f"{colour}_box.ply")
     out = tmp_path_factory.mktemp("prior") / "prior"
-    build_prior(meshes, out, BuildParameters(samples=1000, surface_points=500), workers=1)
+    build_prior(meshes, out, SMALL, workers=1)
     return out
 
 

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import os
+import pickle
 from dataclasses import dataclass, replace
 from pathlib import Path
-from shutil import copyfile
 
 import numpy as np
 import pytest
@@ -13,7 +13,7 @@ from eight_objects import NETWORK, write_scenes
 from filelock import FileLock
 from training.examples import Examples, Recipe, scene_examples
 
-from brrp_cli.ground_truth.scenes import Scene
+from brrp_cli.ground_truth.scenes import Scene, find_scenes
 
 # By heart, and enough to give each of them a surface.
 STEPS, FEW_STEPS, RATE = 350, 60, 1e-2
@@ -32,19 +32,28 @@ class Place:
 
 @pytest.fixture(scope="session")
 def place(tmp_path_factory) -> Place:
-    """Eight objects; `fresh` asks of the same clouds at other points."""
-    folder = tmp_path_factory.mktemp("pointsdf")
-    scenes = write_scenes(folder, 2)
-    one, other = (
-        scene_examples(
-            scenes[0],
-            folder,
-            Recipe("exact", NETWORK.points, queries=4096, seed=seed),
-            folder / "cache",
-        )
-        for seed in (0, 1)
-    )
-    return Place(folder, scenes, one, other, folder / "eight.safetensors")
+    """Eight objects; `fresh` asks of the same clouds at other points. This and what follows is made
+    once for all workers of a run."""
+    base = tmp_path_factory.getbasetemp()
+    if "PYTEST_XDIST_WORKER" in os.environ:
+        base = base.parent
+    folder = base / "pointsdf"
+    made = folder / "examples.pickle"
+    with FileLock(base / "pointsdf.lock"):
+        if not made.is_file():
+            scene, *_ = write_scenes(folder, 2)
+            examples = [
+                scene_examples(
+                    scene,
+                    folder,
+                    Recipe("exact", NETWORK.points, queries=4096, seed=seed),
+                    folder / "cache",
+                )
+                for seed in (0, 1)
+            ]
+            made.write_bytes(pickle.dumps(examples))
+    one, other = pickle.loads(made.read_bytes())
+    return Place(folder, find_scenes(folder / "scenes"), one, other, folder / "eight.safetensors")
 
 
 @pytest.fixture(scope="session")
@@ -55,26 +64,22 @@ def trained(place) -> Place:
 
 
 @pytest.fixture(scope="session")
-def learnt(place, tmp_path_factory) -> Place:
-    """The same after a training that has learnt the eight by heart, which takes long: once for all
-    workers."""
+def learnt(place) -> Place:
+    """The same after a training that has learnt the eight by heart, which takes long."""
     found = replace(place, weights=place.folder / "by_heart" / place.weights.name)
-    found.weights.parent.mkdir()
-    shared = found.weights
-    if "PYTEST_XDIST_WORKER" in os.environ:
-        shared = tmp_path_factory.getbasetemp().parent / found.weights.name
-    with FileLock(shared.with_suffix(".lock")):
-        if not shared.is_file():
-            train(found, STEPS)
-            if shared != found.weights:
-                found.weights.rename(shared)
-    if shared != found.weights:
-        copyfile(shared, found.weights)
+    found.weights.parent.mkdir(exist_ok=True)
+    train(found, STEPS)
     return found
 
 
 def train(place: Place, steps: int) -> None:
-    """All of the eight in every step."""
+    """All of the eight in every step, unless it was done already."""
+    with FileLock(place.weights.with_suffix(".lock")):
+        if not place.weights.is_file():
+            _train(place, steps)
+
+
+def _train(place: Place, steps: int) -> None:
     from training.pointsdf import Training, TrainingConfig
 
     from brrp_cli.methods.pointsdf.weights import save_weights

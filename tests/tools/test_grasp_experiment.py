@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import trimesh
 from PIL import Image
+from scipy.spatial.transform import Rotation
 
 pytest.importorskip("mujoco")
 from grasp_trial.bodies import TrueBody
@@ -23,6 +24,7 @@ from grasp_trial.trial import (
     SHAKEN,
     SLIPPED,
     Trials,
+    misplaced,
 )
 
 from brrp_cli.grasping.gripper_file import open_gripper
@@ -73,6 +75,18 @@ def test_what_happens_is_told(trials, T, result):
     assert found.result == result
 
 
+def test_what_falls_over_by_itself_is_told():
+    """On its edge, 5 degrees off balance: it has hardly moved when the hand comes."""
+    tilted = standing(1, 0.0, (0.05, 0.05, 0.1))
+    angle = np.deg2rad(45 + 5)
+    tilted.T_world_object[:3, :3] = Rotation.from_rotvec([angle, 0, 0]).as_matrix()
+    corners = tilted.mesh.vertices @ tilted.T_world_object[:3, :3].T
+    tilted.T_world_object[2, 3] = -corners[:, 2].min()
+    still = standing(2, 0.3, (0.05, 0.05, 0.1))
+    drift = Trials([tilted, still], FRANKA, 0.5).drift
+    assert drift[1] > 0.01 and drift[2] < 0.001
+
+
 def test_a_wedge_slips_out():
     """Its sides lean by 40 degrees, half of it each; the friction cone has 17."""
     wedge = solids.box(0.05, 0.005, 0.06)
@@ -82,6 +96,14 @@ def test_a_wedge_slips_out():
     body = TrueBody(1, wedge, [vertices], np.eye(4))
     steep = Trials([body], FRANKA, 0.3)
     assert steep.attempt(1, from_above(0.0, 0.03), 0.08, APPROACH).result == SLIPPED
+
+
+def test_a_robot_misses_its_pose_by_what_it_is_said_to():
+    rng, T = np.random.default_rng(0), from_above(0.1, 0.06)
+    found = np.stack([np.linalg.inv(T) @ misplaced(T, 0.001, 0.5, rng) for _ in range(2000)])
+    np.testing.assert_allclose(found[:, :3, 3].std(axis=0), 0.001, rtol=0.06)
+    turns = np.rad2deg(Rotation.from_matrix(found[:, :3, :3]).as_rotvec())
+    np.testing.assert_allclose(turns.std(axis=0), 0.5, rtol=0.06)
 
 
 def test_the_same_grasp_ends_the_same(trials):
@@ -118,16 +140,20 @@ def test_the_report_counts_what_was_carried_out():
     rows = []
     for scene in range(10):
         common = {"set": "prior", "scene": f"prior/{scene}", "object": 1, "drift": 0.0}
-        common |= {"rank": "best", "score": 0.9}
+        common |= {"rank": 1, "score": 0.9}
         rows.append(common | {"method": "default", "result": HELD if scene else SLIPPED})
         rows.append(common | {"method": "mean mesh", "result": HELD if scene > 4 else MISSED})
         # What moved by itself says nothing about a grasp.
         rows.append(common | {"method": "default", "result": MISSED, "drift": 0.1})
+    # Of the last scene: a second grasp, one that was drawn, an object without any.
+    rows.append(common | {"method": "mean mesh", "result": HELD, "rank": 2})
+    rows.append(common | {"method": "default", "result": HELD, "rank": "drawn"})
     rows.append(common | {"method": "default", "result": "none", "score": None, "drift": None})
     told = report(rows, drift=0.005)
-    assert "| default | prior | 90% (70% to 100%), 10 | 10 of 11 |" in told
-    assert "| mean mesh | prior | 50% (20% to 80%), 10 | 10 of 10 |" in told
+    assert "| default | prior | 90% (70% to 100%), 10 | 90% (70% to 100%), 10 | 10 of 11 |" in told
+    assert "| mean mesh | prior | 55% (" in told
+    assert "), 11 | 50% (20% to 80%), 10 | 10 of 10 |" in told
     assert "| default | 10 | 9 (70% to 100%) | 0 | 0 | 0 | 0 | 1 (0% to 30%) | 0 |" in told
-    assert "| mean mesh | prior | +40% (" in told
-    assert "| 0.9 to 0.97 | 10 | 0.90 | 90%" in told and "calibration error: 0.00" in told
+    assert "| mean mesh | prior | +35% (" in told
+    assert "| 0.9 to 0.97 | 11 | 0.90 | 91%" in told and "calibration error: 0.01" in told
     assert "10 objects of which both plan a grasp: +40%" in told

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 
@@ -19,6 +20,8 @@ from grasp_trial.bodies import TrueBody
 
 DEFAULT, MEAN, VPRISM, SEEN, TRUTH = "default", "mean mesh", "vprism", "seen hull", "true mesh"
 METHODS = (DEFAULT, MEAN, VPRISM, SEEN, TRUTH)
+# Only where weights are given.
+POINTSDF = "pointsdf"
 # Fewer points have no hull worth the name.
 FEWEST = 16
 
@@ -30,9 +33,10 @@ def scenes_of(
     prior: Prior | None,
     retriever: Retriever | None,
     seed: int,
+    weights: Path | None = None,
 ) -> dict[str, GraspScene]:
-    """By method: `default` with its posterior; `mean mesh`, the same meshes without; V-PRISM's
-    meshes; the convex hull of the points that are seen; the true meshes."""
+    """By method: `default` with its posterior; `mean mesh`, the same meshes without; meshes of
+    V-PRISM and PointSDF; the convex hull of the points that are seen; the true meshes."""
     assert frame.T_world_cam is not None
     plane = _table(frame)
     found = {}
@@ -40,9 +44,10 @@ def scenes_of(
         result = reconstruct(frame, prior, retriever=retriever, seed=seed, workers=1)
         found[DEFAULT] = scene_of(result)
         found[MEAN] = _without_posteriors(found[DEFAULT])
-    if VPRISM in methods:
-        guess = scene_of(reconstruct(frame, method="vprism", seed=seed, workers=1))
-        found[VPRISM] = _without_posteriors(guess)
+    for other in {VPRISM, POINTSDF} & set(methods):
+        given = weights if other == POINTSDF else None
+        guess = reconstruct(frame, method=other, weights=given, seed=seed, workers=1)
+        found[other] = _without_posteriors(scene_of(guess))
     T_cam_world = np.linalg.inv(frame.T_world_cam)
     if SEEN in methods:
         seen = {i: frame.object_points(i) for i in frame.object_ids}

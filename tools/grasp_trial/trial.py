@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from brrp_cli.geometry import transform_points
 from brrp_cli.grasping.gripper import Gripper
 from brrp_cli.observation.support_plane import Plane
-from brrp_cli.planning.numbers import quaternion_wxyz
 from grasp_trial.bodies import TrueBody
 from grasp_trial.world import STEP, back_along, world_xml
 
@@ -32,11 +32,14 @@ SHAKES, ASIDE, TURN = 3.0, 0.03, np.deg2rad(15)  # Hz, metres, radians
 # Of what is held: it rose by so much of the lift.
 ROSE = 0.6
 TABLE = Plane(np.array([0.0, 0.0, 1.0]), 0.0)
+# T_world_gripper of a hand that is in nobody's way, 2 m over the table.
+AWAY = np.array([[1.0, 0, 0, 0], [0, -1, 0, 0], [0, 0, -1, 2], [0, 0, 0, 1]])
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """result : one of OUTCOMES; drift : metres that the object moved before the hand came."""
+    """result : one of OUTCOMES; drift : metres that a point of the object moves at most, if no hand
+    comes, until it would be lifted."""
 
     result: str
     drift: float
@@ -52,11 +55,13 @@ class Trials:
         self.model = mujoco.MjModel.from_xml_string(world_xml(bodies, gripper, friction))
         self.start = mujoco.MjData(self.model)
         self.ids = [body.object_id for body in bodies]
-        self._place(self.start, np.diag([1.0, -1.0, -1.0, 1.0]) + _at([0, 0, 2]), gripper.opening)
+        self._place(self.start, AWAY, gripper.opening)
         self._run(self.start, SETTLE)
-        first = np.array([body.T_world_object[:3, 3] for body in bodies])
-        moved = np.array([self._where(self.start, i) for i in self.ids]) - first
-        self.drift = dict(zip(self.ids, np.linalg.norm(moved, axis=1).tolist(), strict=True))
+        left_alone = mujoco.MjData(self.model)
+        left_alone.qpos[:] = self.start.qpos
+        self._place(left_alone, AWAY, gripper.opening)
+        self._run(left_alone, APPROACH + CLOSE)
+        self.drift = {body.object_id: _moved(body, left_alone) for body in bodies}
 
     def attempt(
         self,
@@ -141,7 +146,7 @@ class Trials:
     def _place(self, data: Any, T: Array, opening: float) -> None:
         """Put the hand there, at rest, open by `opening`."""
         self._move(data, T)
-        data.joint("hand").qpos[:] = [*T[:3, 3], *quaternion_wxyz(T[:3, :3])]
+        data.joint("hand").qpos[:] = [*data.mocap_pos[0], *data.mocap_quat[0]]
         bend = (self.gripper.opening - opening) / 2
         for name in ("left", "right"):
             data.joint(name).qpos[0] = bend
@@ -150,7 +155,7 @@ class Trials:
 
     def _move(self, data: Any, T: Array) -> None:
         data.mocap_pos[0] = T[:3, 3]
-        data.mocap_quat[0] = quaternion_wxyz(T[:3, :3])
+        self.mj.mju_mat2Quat(data.mocap_quat[0], T[:3, :3].ravel())
 
     def _run(self, data: Any, seconds: float, way: Callable[[float], Array] | None = None) -> None:
         steps = round(seconds / STEP)
@@ -172,6 +177,16 @@ class Trials:
         return str(self.model.body(self.model.geom_bodyid[geom]).name)
 
 
+def _moved(body: TrueBody, data: Any) -> float:
+    """Metres that the furthest moved point of an object is from where the scene has it."""
+    now = data.body(f"object_{body.object_id}")
+    corners = np.concatenate(body.parts)
+    there = corners @ now.xmat.reshape(3, 3).T + now.xpos
+    return float(
+        np.linalg.norm(there - transform_points(body.T_world_object, corners), axis=1).max()
+    )
+
+
 def _at(xyz: Sequence[float]) -> Array:
     shift = np.zeros((4, 4))
     shift[:3, 3] = xyz
@@ -180,6 +195,17 @@ def _at(xyz: Sequence[float]) -> Array:
 
 def _smooth(s: float) -> float:
     return s * s * (3 - 2 * s)
+
+
+def misplaced(T: Array, accuracy: float, angle: float, rng: np.random.Generator) -> Array:
+    """T_world_gripper of a robot that misses its pose T by normal errors along and about each axis
+    of the hand: standard deviations in metres and degrees, as the planner's score counts them."""
+    from scipy.spatial.transform import Rotation
+
+    off = np.eye(4)
+    off[:3, :3] = Rotation.from_rotvec(rng.normal(0, np.deg2rad(angle), 3)).as_matrix()
+    off[:3, 3] = rng.normal(0, accuracy, 3)
+    return np.asarray(T @ off)
 
 
 def _shaken(T: Array, s: float) -> Array:

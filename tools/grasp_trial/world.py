@@ -33,7 +33,7 @@ def world_xml(bodies: Sequence[TrueBody], gripper: Gripper, friction: float) -> 
     follows the mocap body `lead`."""
     model = ET.Element("mujoco", model="grasp")
     ET.SubElement(model, "compiler", angle="radian")
-    ET.SubElement(
+    option = ET.SubElement(
         model,
         "option",
         timestep=str(STEP),
@@ -42,6 +42,8 @@ def world_xml(bodies: Sequence[TrueBody], gripper: Gripper, friction: float) -> 
         impratio="10",
         noslip_iterations="3",
     )
+    # What lies still and is not touched takes no time.
+    ET.SubElement(option, "flag", sleep="enable")
     default = ET.SubElement(model, "default")
     ET.SubElement(
         default,

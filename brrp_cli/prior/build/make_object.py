@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 from importlib.metadata import version
 
 import numpy as np
@@ -134,6 +135,7 @@ def _moved(T_plane_object: np.ndarray, shift: np.ndarray) -> np.ndarray:
     return T
 
 
+@functools.cache
 def library_version(name: str) -> str:
     """The installed version; brrp's own is that of the code that runs."""
     if name == "brrp-cli":

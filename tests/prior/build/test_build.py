@@ -8,6 +8,7 @@ from pathlib import Path
 
 import filelock
 import pytest
+import small_prior
 import trimesh
 from small_prior import prior_bytes
 
@@ -157,13 +158,10 @@ import sys
 from pathlib import Path
 from brrp_cli.errors import BrrpError
 from brrp_cli.prior.build.build import build_prior
-from brrp_cli.config import FeatureConfig
-from brrp_cli.prior.parameters import BuildParameters
-small = BuildParameters(samples=400, surface_points=200, dense_points=2000,
-                        features=FeatureConfig(scales=(0.5, 1.0)))
+from small_prior import SMALL
 if __name__ == "__main__":
     try:
-        build_prior(Path(sys.argv[1]), Path(sys.argv[2]), small, workers=1)
+        build_prior(Path(sys.argv[1]), Path(sys.argv[2]), SMALL, workers=1)
     except BrrpError as error:
         print(error)
         sys.exit(error.exit_code)
@@ -213,7 +211,8 @@ def test_a_killed_build_goes_on_to_the_same_bytes(
     script = tmp_path / "script.py"
     script.write_text(SCRIPT)
     prior = tmp_path / "prior"
-    environment = {**os.environ, "PYTHONPATH": str(Path(brrp_cli.__file__).parents[1])}
+    modules = [Path(brrp_cli.__file__).parents[1], Path(small_prior.__file__).parent]
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(map(str, modules))}
     with subprocess.Popen(
         [sys.executable, script, boxes, prior],
         env=environment,

@@ -6,6 +6,7 @@ import shutil
 from pathlib import Path
 
 import filelock
+import h5py
 import pytest
 import trimesh
 from small_prior import SMALL, prior_bytes
@@ -170,8 +171,11 @@ def test_a_damaged_shard_is_never_taken_over(
     places: dict[str, Path], prior: Path, tmp_path: Path
 ) -> None:
     for shard in (prior / "shards").iterdir():
+        with h5py.File(shard) as file:
+            (name,) = file["objects"]
+            chunk = file[f"objects/{name}/samples"].id.get_chunk_info(0)
         data = bytearray(shard.read_bytes())
-        data[len(data) // 2] ^= 1
+        data[chunk.byte_offset + chunk.size // 2] ^= 1
         shard.write_bytes(data)
     before = prior_bytes(prior)
     with pytest.raises(PriorError, match="damaged"):
