@@ -17,7 +17,11 @@ from brrp_cli.prior.distance_field import DistanceField
 from brrp_cli.prior.shard import DISTANCES
 from brrp_cli.prior.store import Prior
 from brrp_cli.registration.model import BareModel
-from brrp_cli.registration.quick_alignment import alignment_scores
+from brrp_cli.registration.quick_alignment import (
+    FirstPlacements,
+    alignment_scores,
+    first_placements,
+)
 from brrp_cli.registration.verification import Verifier
 
 # What is read of each object.
@@ -35,31 +39,50 @@ HELD = 256
 
 
 class Aligner:
-    """Places stored objects, and keeps the models that it read last."""
+    """Places stored objects, and keeps the models that it read last. search : its numbers"""
 
     def __init__(self, prior: Prior, config: AlignmentConfig) -> None:
         self._prior = prior
-        self._config = config
+        self.search = config.search
         self._held: OrderedDict[str, BareModel] = OrderedDict()
 
-    def scores(
-        self, points: NDArray[np.floating], frame: Frame, plane: Plane, names: Sequence[str]
-    ) -> NDArray[np.float64]:
-        """Alignment scores (m,) of the objects of these names on points (n, 3), metres, camera
-        frame, in random order. Errors: PriorError."""
-        verifier = Verifier(points.astype(np.float64), frame, plane)
-        return alignment_scores(self._models(names), verifier, self._config.search)
+    def on(self, points: NDArray[np.floating], frame: Frame, plane: Plane) -> SeenPart:
+        """What objects are laid over: points (n, 3), metres, camera frame, in random order."""
+        return SeenPart(self, Verifier(points.astype(np.float64), frame, plane))
 
-    def _models(self, names: Sequence[str]) -> list[BareModel]:
+    def models(self, names: Sequence[str]) -> list[BareModel]:
+        """The models of objects of these names. Errors: PriorError."""
         new = [name for name in names if name not in self._held]
         for name, arrays in self._prior.parts(new, PARTS):
-            self._held[name] = bare_model(arrays, self._config.search.fine_points)
+            self._held[name] = bare_model(arrays, self.search.fine_points)
         for name in names:
             self._held.move_to_end(name)
         models = [self._held[name] for name in names]
         while len(self._held) > HELD:
             self._held.popitem(last=False)
         return models
+
+
+class SeenPart:
+    """What is seen of one object, and how stored ones lie over it."""
+
+    def __init__(self, aligner: Aligner, verifier: Verifier) -> None:
+        self._aligner = aligner
+        self._verifier = verifier
+        self._first: dict[str, FirstPlacements] = {}
+
+    def first_scores(self, names: Sequence[str]) -> NDArray[np.float64]:
+        """Alignment scores (m,) of the objects of these names before any is refined. Errors:
+        PriorError."""
+        for name, model in zip(names, self._aligner.models(names), strict=True):
+            self._first[name] = first_placements(model, self._verifier, self._aligner.search)
+        return np.array([self._first[name].score for name in names])
+
+    def scores(self, names: Sequence[str]) -> NDArray[np.float64]:
+        """Alignment scores (m,) of objects that `first_scores` was asked for."""
+        models = self._aligner.models(names)
+        first = [self._first[name] for name in names]
+        return alignment_scores(models, first, self._verifier, self._aligner.search)
 
 
 def bare_model(arrays: dict[str, NDArray[Any]], points: int) -> BareModel:

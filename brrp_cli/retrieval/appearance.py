@@ -114,18 +114,24 @@ class AppearanceRetriever:
         if len(points) < own.least_points:
             return replace(look, alignment=own.neutral)
         order = np.argsort(-likely, kind="stable")
-        order = order[likely[order] > likely[order[0]] * np.exp(-own.margin)]
+        order = order[likely[order] > likely[order[0]] * np.exp(-own.margin)][: own.tried]
         shuffled = points[np.random.default_rng(self._seed).permutation(len(points))]
+        seen = self._aligner.on(shuffled, frame, plane)
+        # In the prior's order, in which shards hold them.
+        tried = np.sort(order)
+        first = seen.first_scores(self._named(look.rows[tried]))
+        promise = np.log(likely[tried]) + own.first * first
+        order = tried[np.argsort(-promise, kind="stable")]
         alignment = np.full(len(look.rows), own.unaligned, np.float32)
         for chosen in (order[: own.most], order[own.most : own.most + own.more]):
-            # In the prior's order, in which shards hold them.
-            chosen = np.sort(chosen)
-            names = [self._names[row] for row in look.rows[chosen]]
-            found = self._aligner.scores(shuffled, frame, plane, names)
+            found = seen.scores(self._named(look.rows[chosen]))
             alignment[chosen] = np.maximum(found, own.lowest)
             if found.max(initial=0.0) >= own.enough:
                 break
         return replace(look, alignment=alignment)
+
+    def _named(self, rows: NDArray[np.int64]) -> list[str]:
+        return [self._names[row] for row in rows]
 
     def _believe(
         self, evidence: Sequence[Similarity], weights: FusionConfig
