@@ -99,6 +99,8 @@ class AlignmentConfig:
         found has; unaligned : that of objects that were not among those; lowest : a lower score
         counts as that one
     search : how they are placed (registration/quick_alignment.py)
+    waves : deviations of the waves of the frame's depth (`sensor`), by which the true object may be
+        off
     """
 
     from_objects: int = 100
@@ -112,6 +114,7 @@ class AlignmentConfig:
     neutral: float = 0.85
     unaligned: float = 0.3
     lowest: float = 0.3
+    waves: float = 2.0
     search: SearchConfig = field(
         default_factory=lambda: SearchConfig(
             turns=16,

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections import OrderedDict
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from brrp_cli.config import SearchConfig, VerificationConfig
 from brrp_cli.config.retrieval import AlignmentConfig
 from brrp_cli.frames.frame import Frame
 from brrp_cli.geometry import similarity
@@ -39,22 +41,31 @@ HELD = 256
 
 
 class Aligner:
-    """Places stored objects, and keeps the models that it read last. search : its numbers"""
+    """Places stored objects, and keeps the models that it read last."""
 
     def __init__(self, prior: Prior, config: AlignmentConfig) -> None:
         self._prior = prior
-        self.search = config.search
+        self._config = config
         self._held: OrderedDict[str, BareModel] = OrderedDict()
 
-    def on(self, points: NDArray[np.floating], frame: Frame, plane: Plane) -> SeenPart:
-        """What objects are laid over: points (n, 3), metres, camera frame, in random order."""
-        return SeenPart(self, Verifier(points.astype(np.float64), frame, plane))
+    def on(self, points: NDArray[np.floating], frame: Frame, plane: Plane, wave: float) -> SeenPart:
+        """What objects are laid over: points (n, 3), metres, camera frame, in random order.
+
+        wave : metres, by which the frame's depth errs over patches (observation/sensor_noise.py)
+        """
+        search = replace(
+            self._config.search,
+            alignment_score=tolerant(
+                self._config.search.alignment_score, self._config.waves * wave
+            ),
+        )
+        return SeenPart(self, Verifier(points.astype(np.float64), frame, plane), search)
 
     def models(self, names: Sequence[str]) -> list[BareModel]:
         """The models of objects of these names. Errors: PriorError."""
         new = [name for name in names if name not in self._held]
         for name, arrays in self._prior.parts(new, PARTS):
-            self._held[name] = bare_model(arrays, self.search.fine_points)
+            self._held[name] = bare_model(arrays, self._config.search.fine_points)
         for name in names:
             self._held.move_to_end(name)
         models = [self._held[name] for name in names]
@@ -63,26 +74,39 @@ class Aligner:
         return models
 
 
+def tolerant(score: VerificationConfig, deviation: float) -> VerificationConfig:
+    """The numbers of a score where depth is off by `deviation`, metres: the true object is no
+    further away and no less far in front than that. Sensors that err by less change nothing."""
+    near = max(score.near, deviation)
+    return replace(
+        score,
+        near=near,
+        far=score.far * near / score.near,
+        tolerance=max(score.tolerance, deviation),
+    )
+
+
 class SeenPart:
     """What is seen of one object, and how stored ones lie over it."""
 
-    def __init__(self, aligner: Aligner, verifier: Verifier) -> None:
+    def __init__(self, aligner: Aligner, verifier: Verifier, search: SearchConfig) -> None:
         self._aligner = aligner
         self._verifier = verifier
+        self._search = search
         self._first: dict[str, FirstPlacements] = {}
 
     def first_scores(self, names: Sequence[str]) -> NDArray[np.float64]:
         """Alignment scores (m,) of the objects of these names before any is refined. Errors:
         PriorError."""
         for name, model in zip(names, self._aligner.models(names), strict=True):
-            self._first[name] = first_placements(model, self._verifier, self._aligner.search)
+            self._first[name] = first_placements(model, self._verifier, self._search)
         return np.array([self._first[name].score for name in names])
 
     def scores(self, names: Sequence[str]) -> NDArray[np.float64]:
         """Alignment scores (m,) of objects that `first_scores` was asked for."""
         models = self._aligner.models(names)
         first = [self._first[name] for name in names]
-        return alignment_scores(models, first, self._verifier, self._aligner.search)
+        return alignment_scores(models, first, self._verifier, self._search)
 
 
 def bare_model(arrays: dict[str, NDArray[Any]], points: int) -> BareModel:
