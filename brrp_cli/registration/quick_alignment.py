@@ -109,10 +109,9 @@ def raised_poses(
     """Those of the resting poses T_cam_model (B, 4, 4) whose top is lower than that of the seen
     points (n, 3) by more than `hidden`, raised to it: an object that lies on others."""
     top = np.quantile(plane.signed_distance(seen), 1 - config.stray)
-    placed = resting[:, :3, :3] @ model.surface.T + resting[:, :3, 3:]
-    missing = top - (plane.signed_distance(placed.swapaxes(1, 2).reshape(-1, 3))).reshape(
-        len(resting), -1
-    ).max(axis=1)
+    up = plane.normal @ resting[:, :3, :3]
+    reached = (up @ model.surface.T).max(axis=1)
+    missing = top - reached - plane.signed_distance(resting[:, :3, 3])
     raised = resting.copy()
     raised[:, :3, 3] += missing[:, None] * plane.normal
     return raised[missing > config.hidden]
