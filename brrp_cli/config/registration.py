@@ -124,10 +124,11 @@ class SearchConfig:
     size_cost + size_spread_cost * ln(size)^2. No other size is tried where the score reaches
     `settled`, and nothing is refined further where none of the placements reaches `hopeless` or all
     stay `beaten` behind another model's. Of placements whose surfaces lie within `distinct` metres
-    the best is kept, `kept` in all.
+    the best is kept, `kept` in all. rotations : evenly spread, which retrieval tries too.
     """
 
     turns: int = 24
+    rotations: int = 0
     model_points: int = 300
     least_facing: int = 6
     stray: float = share(0.02)

@@ -89,34 +89,42 @@ class AlignmentConfig:
 
     from_objects : size of the prior from which on they are. Fewer objects are told apart without
         it, `likeness` in place of `fusion`, and real depth lowers the scores of the right one too
-    most : objects that are, the most probable by their likenesses; where none of them reaches the
-        score `enough`, so are the next `more`: what leans on others, or is hidden in part, is less
-        alike; margin : nats by which theirs may be less than the best one's; least_points : of the
-        object that have to be seen
+    tried : objects that are laid over what is seen, the most probable by their likenesses; margin :
+        nats by which theirs may be less than the best one's; first : weight, in nats, of the score
+        that they reach before any is refined
+    most : objects whose placements are refined, the best by likenesses and first score; where none
+        of them reaches the score `enough`, so are the next `more`
+    least_points : of the object that have to be seen
     neutral : alignment score where nothing can be aligned: about what an object that is rightly
         found has; unaligned : that of objects that were not among those; lowest : a lower score
         counts as that one
     search : how they are placed (registration/quick_alignment.py)
+    waves : deviations of the waves of the frame's depth (`sensor`), by which the true object may be
+        off
     """
 
     from_objects: int = 100
-    most: int = 30
-    enough: float = share(0.8)
-    more: int = 40
+    tried: int = 80
     margin: float = 12.0
+    first: float = 15.0
+    most: int = 24
+    enough: float = share(0.8)
+    more: int = 24
     least_points: int = 20
     neutral: float = 0.85
     unaligned: float = 0.3
     lowest: float = 0.3
+    waves: float = 2.0
     search: SearchConfig = field(
         default_factory=lambda: SearchConfig(
             turns=16,
+            rotations=200,
             model_points=100,
             seen_points=100,
             first_share=2,
-            coarse=24,
+            coarse=48,
             coarse_points=60,
-            coarse_steps=6,
+            coarse_steps=10,
             beaten=0.25,
             fine=6,
             fine_points=250,
@@ -136,11 +144,11 @@ class FusionConfig:
     docs/retrieval.md has the commands.
     """
 
-    colour: float = 23.9
-    pairs: float = 8.8
-    size: float = 0.24
-    alignment: float = between(13.5, 0.0, 1000.0)
-    offset: float = between(6.4, -100.0, 100.0)
+    colour: float = 33.2
+    pairs: float = 9.7
+    size: float = 0.28
+    alignment: float = between(19.7, 0.0, 1000.0)
+    offset: float = between(8.0, -100.0, 100.0)
     crowding: float = between(0.1, 0.0, 10.0)
 
 

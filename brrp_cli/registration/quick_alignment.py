@@ -8,12 +8,16 @@ which tells models apart long before that.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
 from itertools import permutations, product
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
 from brrp_cli.config import SearchConfig
+from brrp_cli.geometry import normalise
 from brrp_cli.observation.support_plane import Plane
 from brrp_cli.registration.initial_poses import resting_initial_poses
 from brrp_cli.registration.model import ModelGeometry
@@ -23,16 +27,30 @@ from brrp_cli.registration.verification import Verifier
 Array = NDArray[np.float64]
 
 
+@dataclass(frozen=True)
+class FirstPlacements:
+    """T_cam_model (B, 4, 4), the most promising placements of a model, unrefined, and the score of
+    the best, 1 at best."""
+
+    T_cam_model: Array
+    score: float
+
+
 def alignment_scores(
-    models: Sequence[ModelGeometry], verifier: Verifier, config: SearchConfig
+    models: Sequence[ModelGeometry],
+    placements: Sequence[FirstPlacements],
+    verifier: Verifier,
+    config: SearchConfig,
 ) -> Array:
-    """The alignment score (m,) that each model reaches, 1 at best, on a plane that `verifier` must
-    have.
+    """The alignment score (m,) that each model reaches from its first placements, 1 at best.
 
     All are refined coarsely; those that stay `beaten` behind the best of them are not refined
     further. Scores are compared with `seen_points` observed points, at last with `fine_points`.
     """
-    rough = [_coarse(model, verifier, config) for model in models]
+    rough = [
+        _coarse(model, first, verifier, config)
+        for model, first in zip(models, placements, strict=True)
+    ]
     score = np.array([reached for _, reached in rough])
     for i in np.flatnonzero(score >= score.max(initial=-np.inf) - config.beaten).tolist():
         T = _refined(
@@ -47,9 +65,11 @@ def alignment_scores(
     return score
 
 
-def _coarse(model: ModelGeometry, verifier: Verifier, config: SearchConfig) -> tuple[Array, float]:
-    """The `fine` best placements T_cam_model (B, 4, 4) after a coarse refinement, and the best
-    score."""
+def first_placements(
+    model: ModelGeometry, verifier: Verifier, config: SearchConfig
+) -> FirstPlacements:
+    """The `coarse` best of all ways to lay a model over what is seen, on a plane that `verifier`
+    must have: resting, raised, leaning."""
     assert verifier.plane is not None
     resting = np.stack(resting_initial_poses(model, verifier.points, verifier.plane, config))
     T = np.concatenate(
@@ -57,12 +77,26 @@ def _coarse(model: ModelGeometry, verifier: Verifier, config: SearchConfig) -> t
             resting,
             raised_poses(resting, model, verifier.points, verifier.plane, config),
             principal_poses(model, verifier.points),
+            turned_poses(model, verifier.points, config),
         ]
     )
-    first = _scores(T, model, verifier, config, config.seen_points // config.first_share)
-    T = T[np.argsort(-first, kind="stable")[: config.coarse]]
+    score = _scores(T, model, verifier, config, config.seen_points // config.first_share)
+    order = np.argsort(-score, kind="stable")[: config.coarse]
+    return FirstPlacements(np.asarray(T[order]), float(score[order[0]]))
+
+
+def _coarse(
+    model: ModelGeometry, first: FirstPlacements, verifier: Verifier, config: SearchConfig
+) -> tuple[Array, float]:
+    """The `fine` best placements T_cam_model (B, 4, 4) after a coarse refinement, and the best
+    score."""
     T = _refined(
-        T, model, verifier, config.coarse_points, config.coarse_distance, config.coarse_steps
+        first.T_cam_model,
+        model,
+        verifier,
+        config.coarse_points,
+        config.coarse_distance,
+        config.coarse_steps,
     )
     score = _scores(T, model, verifier, config, config.seen_points)
     order = np.argsort(-score, kind="stable")[: config.fine]
@@ -75,10 +109,9 @@ def raised_poses(
     """Those of the resting poses T_cam_model (B, 4, 4) whose top is lower than that of the seen
     points (n, 3) by more than `hidden`, raised to it: an object that lies on others."""
     top = np.quantile(plane.signed_distance(seen), 1 - config.stray)
-    placed = resting[:, :3, :3] @ model.surface.T + resting[:, :3, 3:]
-    missing = top - (plane.signed_distance(placed.swapaxes(1, 2).reshape(-1, 3))).reshape(
-        len(resting), -1
-    ).max(axis=1)
+    up = plane.normal @ resting[:, :3, :3]
+    reached = (up @ model.surface.T).max(axis=1)
+    missing = top - reached - plane.signed_distance(resting[:, :3, 3])
     raised = resting.copy()
     raised[:, :3, 3] += missing[:, None] * plane.normal
     return raised[missing > config.hidden]
@@ -97,6 +130,58 @@ def principal_poses(model: ModelGeometry, seen: Array) -> Array:
     T[:, :3, :3] = axes.T @ _CUBE @ own_axes
     T[:, :3, 3] = middle - T[:, :3, :3] @ own
     return T
+
+
+def turned_poses(model: ModelGeometry, seen: Array, config: SearchConfig) -> Array:
+    """T_cam_model (`rotations`, 4, 4) of the model turned in every way: what leans on others.
+
+    seen : (n, 3), metres, camera frame, in random order
+
+    The box of the side that faces the camera is laid over the box of the seen points across the
+    line of sight, and its nearest point to theirs along it.
+    """
+    rotations = spread_rotations(config.rotations)
+    if not len(rotations):
+        return np.zeros((0, 4, 4))
+    ahead = normalise(seen.mean(axis=0))
+    # Two directions across the line of sight, and it.
+    T_sight_cam = np.stack([*np.linalg.svd(ahead[None])[2][1:], ahead])
+    low, high = np.quantile(
+        seen[: config.box_points] @ T_sight_cam.T, [config.stray, 1 - config.stray], axis=0
+    )
+    turned = T_sight_cam @ rotations
+    placed = turned @ model.surface[: config.model_points].T
+    facing = turned[:, 2] @ model.normals[: config.model_points].T < 0
+    nearest = np.where(facing[:, None], placed, np.inf).min(axis=-1)
+    furthest = np.where(facing[:, None], placed, -np.inf).max(axis=-1)
+    shift = (low + high) / 2 - (nearest + furthest) / 2
+    shift[:, 2] = low[2] - nearest[:, 2]
+    T = np.tile(np.eye(4), (len(rotations), 1, 1))
+    T[:, :3, :3] = rotations
+    T[:, :3, 3] = shift @ T_sight_cam
+    # A model none of whose points faces the camera cannot be laid over anything.
+    return np.asarray(T[facing.any(axis=1)])
+
+
+@lru_cache(maxsize=4)
+def spread_rotations(count: int) -> Array:
+    """(count, 3, 3), spread evenly over all rotations, on super-Fibonacci spirals (Alexa 2022)."""
+    if not count:
+        return np.zeros((0, 3, 3))
+    at = np.arange(count) + 0.5
+    inner, outer = np.sqrt(at / count), np.sqrt(1 - at / count)
+    first, second = 2 * np.pi * at / np.sqrt(2), 2 * np.pi * at / _PSI
+    quaternions = [
+        inner * np.sin(first),
+        inner * np.cos(first),
+        outer * np.sin(second),
+        outer * np.cos(second),
+    ]
+    return np.asarray(Rotation.from_quat(np.stack(quaternions, axis=1)).as_matrix())
+
+
+# The root of psi^4 = psi + 4.
+_PSI = 1.533751168755204288118041
 
 
 def _rotations_of_a_cube() -> Array:

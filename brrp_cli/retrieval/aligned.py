@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections import OrderedDict
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from brrp_cli.config import SearchConfig, VerificationConfig
 from brrp_cli.config.retrieval import AlignmentConfig
 from brrp_cli.frames.frame import Frame
 from brrp_cli.geometry import similarity
@@ -17,7 +19,11 @@ from brrp_cli.prior.distance_field import DistanceField
 from brrp_cli.prior.shard import DISTANCES
 from brrp_cli.prior.store import Prior
 from brrp_cli.registration.model import BareModel
-from brrp_cli.registration.quick_alignment import alignment_scores
+from brrp_cli.registration.quick_alignment import (
+    FirstPlacements,
+    alignment_scores,
+    first_placements,
+)
 from brrp_cli.registration.verification import Verifier
 
 # What is read of each object.
@@ -42,15 +48,21 @@ class Aligner:
         self._config = config
         self._held: OrderedDict[str, BareModel] = OrderedDict()
 
-    def scores(
-        self, points: NDArray[np.floating], frame: Frame, plane: Plane, names: Sequence[str]
-    ) -> NDArray[np.float64]:
-        """Alignment scores (m,) of the objects of these names on points (n, 3), metres, camera
-        frame, in random order. Errors: PriorError."""
-        verifier = Verifier(points.astype(np.float64), frame, plane)
-        return alignment_scores(self._models(names), verifier, self._config.search)
+    def on(self, points: NDArray[np.floating], frame: Frame, plane: Plane, wave: float) -> SeenPart:
+        """What objects are laid over: points (n, 3), metres, camera frame, in random order.
 
-    def _models(self, names: Sequence[str]) -> list[BareModel]:
+        wave : metres, by which the frame's depth errs over patches (observation/sensor_noise.py)
+        """
+        search = replace(
+            self._config.search,
+            alignment_score=tolerant(
+                self._config.search.alignment_score, self._config.waves * wave
+            ),
+        )
+        return SeenPart(self, Verifier(points.astype(np.float64), frame, plane), search)
+
+    def models(self, names: Sequence[str]) -> list[BareModel]:
+        """The models of objects of these names. Errors: PriorError."""
         new = [name for name in names if name not in self._held]
         for name, arrays in self._prior.parts(new, PARTS):
             self._held[name] = bare_model(arrays, self._config.search.fine_points)
@@ -60,6 +72,41 @@ class Aligner:
         while len(self._held) > HELD:
             self._held.popitem(last=False)
         return models
+
+
+def tolerant(score: VerificationConfig, deviation: float) -> VerificationConfig:
+    """The numbers of a score where depth is off by `deviation`, metres: the true object is no
+    further away and no less far in front than that. Sensors that err by less change nothing."""
+    near = max(score.near, deviation)
+    return replace(
+        score,
+        near=near,
+        far=score.far * near / score.near,
+        tolerance=max(score.tolerance, deviation),
+    )
+
+
+class SeenPart:
+    """What is seen of one object, and how stored ones lie over it."""
+
+    def __init__(self, aligner: Aligner, verifier: Verifier, search: SearchConfig) -> None:
+        self._aligner = aligner
+        self._verifier = verifier
+        self._search = search
+        self._first: dict[str, FirstPlacements] = {}
+
+    def first_scores(self, names: Sequence[str]) -> NDArray[np.float64]:
+        """Alignment scores (m,) of the objects of these names before any is refined. Errors:
+        PriorError."""
+        for name, model in zip(names, self._aligner.models(names), strict=True):
+            self._first[name] = first_placements(model, self._verifier, self._search)
+        return np.array([self._first[name].score for name in names])
+
+    def scores(self, names: Sequence[str]) -> NDArray[np.float64]:
+        """Alignment scores (m,) of objects that `first_scores` was asked for."""
+        models = self._aligner.models(names)
+        first = [self._first[name] for name in names]
+        return alignment_scores(models, first, self._verifier, self._search)
 
 
 def bare_model(arrays: dict[str, NDArray[Any]], points: int) -> BareModel:

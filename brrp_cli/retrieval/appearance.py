@@ -20,6 +20,7 @@ from brrp_cli.config.retrieval import FusionConfig
 from brrp_cli.errors import RetrievalError
 from brrp_cli.frames.frame import BACKGROUND, Frame
 from brrp_cli.observation.ray_samples import box_center
+from brrp_cli.observation.sensor_noise import wave_deviation
 from brrp_cli.observation.strays import without_strays
 from brrp_cli.observation.support_plane import Plane, fit_plane
 from brrp_cli.prior.store import Prior
@@ -96,8 +97,9 @@ class AppearanceRetriever:
         if plane is None:
             return {i: replace(look, alignment=own.alignment.neutral) for i, look in looks.items()}
         likely = self._believe(list(looks.values()), own.likeness)
+        wave = wave_deviation(frame, plane, self._config.hypotheses.sensor)
         return {
-            i: self._aligned(look, probabilities[look.rows], points[i], frame, plane)
+            i: self._aligned(look, probabilities[look.rows], points[i], frame, plane, wave)
             for (i, look), probabilities in zip(looks.items(), likely, strict=True)
         }
 
@@ -108,24 +110,31 @@ class AppearanceRetriever:
         points: NDArray[np.float64],
         frame: Frame,
         plane: Plane,
+        wave: float,
     ) -> Similarity:
         """With the alignment scores of the objects that are `likely` (m,) by their looks."""
         own = self._config.retrieval.alignment
         if len(points) < own.least_points:
             return replace(look, alignment=own.neutral)
         order = np.argsort(-likely, kind="stable")
-        order = order[likely[order] > likely[order[0]] * np.exp(-own.margin)]
+        order = order[likely[order] > likely[order[0]] * np.exp(-own.margin)][: own.tried]
         shuffled = points[np.random.default_rng(self._seed).permutation(len(points))]
+        seen = self._aligner.on(shuffled, frame, plane, wave)
+        # In the prior's order, in which shards hold them.
+        tried = np.sort(order)
+        first = seen.first_scores(self._named(look.rows[tried]))
+        promise = np.log(likely[tried]) + own.first * first
+        order = tried[np.argsort(-promise, kind="stable")]
         alignment = np.full(len(look.rows), own.unaligned, np.float32)
         for chosen in (order[: own.most], order[own.most : own.most + own.more]):
-            # In the prior's order, in which shards hold them.
-            chosen = np.sort(chosen)
-            names = [self._names[row] for row in look.rows[chosen]]
-            found = self._aligner.scores(shuffled, frame, plane, names)
+            found = seen.scores(self._named(look.rows[chosen]))
             alignment[chosen] = np.maximum(found, own.lowest)
             if found.max(initial=0.0) >= own.enough:
                 break
         return replace(look, alignment=alignment)
+
+    def _named(self, rows: NDArray[np.int64]) -> list[str]:
+        return [self._names[row] for row in rows]
 
     def _believe(
         self, evidence: Sequence[Similarity], weights: FusionConfig

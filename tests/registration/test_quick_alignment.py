@@ -13,8 +13,11 @@ from brrp_cli.registration.initial_poses import resting_initial_poses
 from brrp_cli.registration.model import search_model
 from brrp_cli.registration.quick_alignment import (
     alignment_scores,
+    first_placements,
     principal_poses,
     raised_poses,
+    spread_rotations,
+    turned_poses,
 )
 from brrp_cli.registration.verification import Verifier
 
@@ -34,10 +37,15 @@ def seen(mesh, T_cam_mesh):
     return Verifier(np.random.default_rng(0).permutation(points), frame, TABLE)
 
 
+def scores(models, verifier):
+    first = [first_placements(model, verifier, CONFIG) for model in models]
+    return alignment_scores(models, first, verifier, CONFIG)
+
+
 def test_the_true_model_scores_highest(models):
     where = placed(0.05, -0.04, 0.3)
     for true, mesh in enumerate((box(), ell())):
-        score = alignment_scores(models, seen(mesh, where), CONFIG)
+        score = scores(models, seen(mesh, where))
         assert score[true] > 0.9 and score[1 - true] < score[true] - 0.1
 
 
@@ -48,7 +56,7 @@ def test_an_object_that_leans_or_lies_on_others_is_aligned_too(models):
     raised = similarity(translation=np.array([0.05, -0.04, 0.09]))
     for T_world_mesh in (leaning, raised):
         where = T_CAM_WORLD @ T_world_mesh
-        score = alignment_scores(models, seen(box(), where), CONFIG)
+        score = scores(models, seen(box(), where))
         assert score[0] > 0.85 and score[1] < score[0] - 0.2
 
 
@@ -73,3 +81,27 @@ def test_raised_poses_reach_the_top_of_what_is_seen(models):
     for T in raised:
         height = TABLE.signed_distance(transform_points(T, models[0].surface)).max()
         assert height == pytest.approx(top, abs=1e-9)
+
+
+def test_rotations_are_spread_over_all_of_them():
+    spread = spread_rotations(200)
+    np.testing.assert_allclose(
+        spread @ spread.swapaxes(1, 2), np.tile(np.eye(3), (200, 1, 1)), atol=1e-9
+    )
+    wanted = Rotation.random(300, rng=0).as_matrix()
+    cosine = (np.einsum("aij,bij->ab", wanted, spread) - 1) / 2
+    # 200 balls of the mean radius cover all rotations only if they do not overlap much.
+    assert np.degrees(np.arccos(cosine.max(axis=1))).max() < 45
+
+
+def test_a_turned_model_lies_over_what_is_seen(models):
+    """The side that faces the camera, and no other, has the box of the seen points."""
+    where = T_CAM_WORLD @ similarity(translation=np.array([0.05, -0.04, 0.2]))
+    verifier = seen(box(), where)
+    poses = turned_poses(models[0], verifier.points, CONFIG)
+    assert len(poses) == CONFIG.rotations
+    turn = np.einsum("bij,ij->b", poses[:, :3, :3], where[:3, :3])
+    nearest = poses[int(turn.argmax())]
+    # The turn is off by up to 30 degrees, which moves an object of 10 cm by a few of them.
+    middle = transform_points(where, models[0].stored.center)
+    assert np.linalg.norm(nearest[:3, 3] - middle) < 0.03
