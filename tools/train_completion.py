@@ -135,7 +135,6 @@ def main(
         raise click.ClickException(str(error)) from error
     if not finished:
         click.echo(f"Stopped in epoch {done.epoch + 1}; the same command goes on")
-    if not done.history:
         return
     best = training.best(held)
     record = min(done.history, key=lambda each: each["nll"])
