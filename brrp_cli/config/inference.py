@@ -103,7 +103,7 @@ class CompletionConfig:
         to what a length is divided by that may be 0
     """
 
-    learned: bool = False
+    learned: bool = True
     cell: float = 0.004
     closing: int = 7
     least: float = 0.005
