@@ -95,7 +95,7 @@ def _hypotheses() -> HypothesesConfig:
 
 
 @cache
-def _solid(mesh_path: str, data_root: Path) -> Any:
+def solid_of(mesh_path: str, data_root: Path) -> Any:
     """A ray casting scene with the object's closed mesh, metres, in the frame of its file; None for
     a mesh that cannot be closed."""
     try:
@@ -106,7 +106,8 @@ def _solid(mesh_path: str, data_root: Path) -> Any:
     return raycasting_scene([mesh])
 
 
-def _inside(points: NDArray[np.floating], solid: Any) -> NDArray[np.bool_]:
+def is_inside(points: NDArray[np.floating], solid: Any) -> NDArray[np.bool_]:
+    """Which of points (n, 3), in the frame of the mesh's file, lie in it."""
     query = import_open3d().core.Tensor(np.ascontiguousarray(points, dtype=np.float32))
     return np.asarray(solid.compute_occupancy(query, nsamples=3).numpy() > 0.5)
 
@@ -134,20 +135,20 @@ def look(scene: Scene, data_root: Path, only: tuple[str, ...], views: int, seed:
         plane = fit_plane(ground, config.observation, seed, middle)
         for object_id, cloud in clouds.items():
             true = scene.object(object_id)
-            solid = _solid(true.mesh_path, data_root)
+            solid = solid_of(true.mesh_path, data_root)
             if solid is None or (only and not any(word in true.name for word in only)):
                 continue
             part = visible_part(cloud, frame, object_id, plane, _hypotheses().completion)
-            points = _asked(part, rng)
+            points = asked_points(part, rng)
             points = points[~empty_space(points, frame, object_id, plane, _hypotheses().mean)]
             in_file = transform_points(np.linalg.inv(true.T_world_object) @ T_world_cam, points)
             found.append(
-                Examples(point_features(points, part).astype(np.float16), _inside(in_file, solid))
+                Examples(point_features(points, part).astype(np.float16), is_inside(in_file, solid))
             )
     return _together(found)
 
 
-def _asked(part: VisiblePart, rng: np.random.Generator) -> NDArray[np.float64]:
+def asked_points(part: VisiblePart, rng: np.random.Generator) -> NDArray[np.float64]:
     """Points (n, 3), metres, camera frame, at which an object is looked at."""
     margin = _hypotheses().map.margin
     low, high = part.extent.min(axis=0) - margin, part.extent.max(axis=0) + margin

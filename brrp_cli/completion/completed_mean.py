@@ -4,6 +4,8 @@ cannot be in.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import binary_dilation, maximum_filter, minimum_filter
@@ -45,8 +47,9 @@ def network_grid(
     at = nodes[0, 0, 0] + (nodes[1, 1, 1] - nodes[0, 0, 0]) * np.stack(
         np.meshgrid(*steps, indexing="ij"), axis=-1
     )
+    thinks = _network(part)
     asked = np.full(odd.shape, -config.limit, np.float32)
-    asked[odd] = _network(at[odd], part)
+    asked[odd] = thinks(at[odd])
     doubtful = (maximum_filter(asked, 3) > -config.beyond_doubt) & (
         minimum_filter(asked, 3) < config.beyond_doubt
     )
@@ -54,7 +57,7 @@ def network_grid(
         asked = _doubled(asked, axis, count)
         doubtful = doubtful.repeat(2, axis=axis).take(np.arange(count), axis=axis)
     doubtful &= ~empty
-    asked[doubtful] = _network(nodes[doubtful], part)
+    asked[doubtful] = thinks(nodes[doubtful])
     return asked
 
 
@@ -76,8 +79,20 @@ def shell_of(nodes: Array, config: MeanConfig) -> float:
     return max(config.shell, config.shell_nodes * spacing)
 
 
-def _network(points: Array, part: VisiblePart) -> Floats:
-    return fitted().logits(point_features(points, part)) if len(points) else np.empty(0, np.float32)
+def _network(part: VisiblePart) -> Callable[[Array], Floats]:
+    """Log odds (n,) at points (n, 3), by the network that the configuration chooses."""
+    if part.config.learned:
+        # torch takes its time to load.
+        from brrp_cli.completion.learned import LearnedShape, shapes
+
+        return LearnedShape(part, part.config.volume, shapes()).logits
+
+    def from_lengths(points: Array) -> Floats:
+        if not len(points):
+            return np.empty(0, np.float32)
+        return fitted().logits(point_features(points, part))
+
+    return from_lengths
 
 
 def _doubled(values: Floats, axis: int, count: int) -> Floats:

@@ -1,5 +1,7 @@
 """From per-point features to the log odds that a point is inside: a small network, fitted once.
 
+learned.py has the larger one, which begins as this one.
+
 `tools/fit_completion.py` fits it and says on what; brrp_cli/completion/weights.npz holds it.
 """
 

@@ -11,7 +11,13 @@ from dataclasses import asdict, dataclass, field
 from typing import Any
 
 from brrp_cli.config.baselines import CoarseToFineConfig, PointSDFConfig, VPrismConfig
-from brrp_cli.config.inference import CompletionConfig, FittedMapConfig, InferenceConfig, MeanConfig
+from brrp_cli.config.inference import (
+    CompletionConfig,
+    FittedMapConfig,
+    InferenceConfig,
+    MeanConfig,
+    VolumeConfig,
+)
 from brrp_cli.config.kin import KinConfig
 from brrp_cli.config.observation import ObservationConfig, SensorConfig, StrayConfig
 from brrp_cli.config.registration import (
@@ -54,6 +60,7 @@ __all__ = [
     "TurnConfig",
     "VPrismConfig",
     "VerificationConfig",
+    "VolumeConfig",
     "WeighConfig",
     "preset",
 ]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from brrp_cli.config.ranges import share
 
@@ -55,9 +55,33 @@ class MeanConfig:
 
 
 @dataclass(frozen=True)
+class VolumeConfig:
+    """The volume that the network of learned shapes looks at (brrp_cli/completion/volume.py). All
+    of it belongs to the network's weights.
+
+    side : voxels along each edge, a multiple of 8
+    depth : an object counts as at least so many times as deep as wide; margin : of its largest
+        extent, on each side; hidden : so much more where another object hides all of its outline;
+        below : of the largest extent, under the plane
+    near : voxels behind and in front of the measured depth at which the finer distance is cut off;
+        full : observed points that fill a voxel
+    """
+
+    side: int = 40
+    depth: float = 0.8
+    margin: float = 0.1
+    hidden: float = 0.3
+    below: float = 0.05
+    near: float = 3.0
+    full: float = 2.0
+
+
+@dataclass(frozen=True)
 class CompletionConfig:
     """The shape of an object that no stored one explains (brrp_cli/completion).
 
+    learned : by the network that has learned shapes, which sees the object's surroundings as a
+        `volume`; otherwise by a smaller one that sees lengths at a point alone
     cell : metres, of grids in which observed points are merged; closing : gaps of fewer cells are
     closed
 
@@ -79,6 +103,7 @@ class CompletionConfig:
         to what a length is divided by that may be 0
     """
 
+    learned: bool = True
     cell: float = 0.004
     closing: int = 7
     least: float = 0.005
@@ -99,6 +124,7 @@ class CompletionConfig:
     far: float = 0.2
     ratio: float = 4.0
     thin: float = 0.002
+    volume: VolumeConfig = field(default_factory=VolumeConfig)
 
 
 @dataclass(frozen=True)

@@ -9,6 +9,7 @@ import pytest
 from table_scene import TABLE, box, in_camera, photograph, placed
 
 from brrp_cli.completion.completed_mean import completed_grid, empty_space
+from brrp_cli.completion.learned import LearnedShape, shapes
 from brrp_cli.completion.network import Network, fitted, from_bytes
 from brrp_cli.completion.point_features import COUNT, point_features
 from brrp_cli.completion.visible_part import visible_part
@@ -28,9 +29,9 @@ def photographed(mesh, T_cam_mesh):
     return photograph({5: in_camera(mesh, T_cam_mesh)})
 
 
-def part_of(frame, plane=TABLE, points=None):
+def part_of(frame, plane=TABLE, points=None, config=CONFIG):
     points = frame.object_points(5) if points is None else points
-    return visible_part(points, frame, 5, plane, CONFIG)
+    return visible_part(points, frame, 5, plane, config)
 
 
 def completed(frame, config=MEAN, margin=0.05):
@@ -109,17 +110,22 @@ def test_what_is_seen_has_some_thickness_whatever_the_network_says():
     np.testing.assert_array_equal(with_crust[~seen], without[~seen])
 
 
-@pytest.mark.parametrize("nodes", [20_000, 60_000])
-def test_the_lattice_is_the_networks_where_it_counts(nodes):
+@pytest.mark.parametrize(("nodes", "learned"), [(20_000, False), (60_000, False), (20_000, True)])
+def test_the_lattice_is_the_networks_where_it_counts(nodes, learned):
     frame = photographed(box(), placed(0.0, 0.0, 0.3))
     config = replace(BARE, nodes=nodes)
-    part = part_of(frame)
+    part = part_of(frame, config=replace(CONFIG, learned=learned))
     extent = part.extent
     around = np.stack([extent.min(axis=0) - 0.01, extent.max(axis=0) + 0.01])
     _, _, at = grid_over(around, config.nodes)
     # Along x the last node is asked first, along y it lies beyond the last that is.
     at = at[: (at.shape[0] - 1) // 2 * 2 + 1, : at.shape[1] // 2 * 2]
-    exact = fitted().logits(point_features(at.reshape(-1, 3), part)).reshape(at.shape[:3])
+    every = at.reshape(-1, 3)
+    if learned:
+        exact = LearnedShape(part, part.config.volume, shapes()).logits(every)
+    else:
+        exact = fitted().logits(point_features(every, part))
+    exact = exact.reshape(at.shape[:3])
     nothing, everything = np.zeros(at.shape[:3], bool), np.ones(at.shape[:3], bool)
     found = completed_grid(at, nothing, part, config).astype(float)
     # Half precision; a node on the edge of a pixel may fall on either side.

@@ -1,0 +1,112 @@
+"""The completion that has learned shapes, as it comes with the package.
+
+`tools/train_completion.py` trains it and says on what; brrp_cli/completion/shapes.safetensors holds
+it, in half precision. The metadata has `format`, `network` (JSON of its ShapeNetworkConfig) and
+`training` (JSON: on what, how much, how well).
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict
+from functools import cache
+from importlib.resources import as_file, files
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brrp_cli.completion.point_features import point_features
+from brrp_cli.completion.visible_part import VisiblePart
+from brrp_cli.completion.volume import volume_of
+from brrp_cli.config import VolumeConfig
+from brrp_cli.dependencies import import_library
+from brrp_cli.errors import WeightsError
+from brrp_cli.files import write_bytes
+
+if TYPE_CHECKING:
+    from torch import Tensor
+
+    from brrp_cli.completion.shape_network import ShapeNetwork
+
+Floats = NDArray[np.float32]
+
+FORMAT = "brrp completion 1"
+NAME = "shapes.safetensors"
+
+
+class LearnedShape:
+    """What the network thinks of one object: its volume is looked at once, and then it is asked at
+    points."""
+
+    def __init__(self, part: VisiblePart, config: VolumeConfig, network: ShapeNetwork) -> None:
+        import torch
+
+        self.part, self.network = part, network
+        self.volume = volume_of(part, config)
+        with torch.no_grad():
+            values = torch.from_numpy(self.volume.values.astype(np.float32) / 127)
+            self.features: Tensor = network.encode(values[None])
+
+    def logits(self, points: NDArray[np.floating]) -> Floats:
+        """Log odds (n,) that points (n, 3), metres, camera frame, are inside."""
+        import torch
+
+        if not len(points):
+            return np.empty(0, np.float32)
+        network = self.network
+        places = torch.from_numpy(self.volume.places(points))
+        lengths = torch.from_numpy(point_features(np.asarray(points, np.float64), self.part))
+        with torch.no_grad():
+            found = network.at(self.features, places[None])[0]
+            return np.asarray(network.decide(network.scaled(lengths), found).numpy())
+
+
+def save_shapes(network: ShapeNetwork, training: dict[str, Any], path: Path) -> None:
+    """Write the file, in half precision, whole or not at all. Errors: OutputError."""
+    import torch
+
+    tensors = {
+        name: tensor.detach().to(torch.float16).contiguous()
+        for name, tensor in network.state_dict().items()
+    }
+    metadata = {
+        "format": FORMAT,
+        "network": json.dumps(asdict(network.config)),
+        "training": json.dumps(training),
+    }
+    write_bytes(path, import_library("safetensors.torch").save(tensors, metadata=metadata))
+
+
+def load_shapes(path: Path) -> ShapeNetwork:
+    """The network of a file. Errors: WeightsError if it is missing, damaged or of another kind."""
+    import torch
+
+    from brrp_cli.completion.shape_network import ShapeNetwork, ShapeNetworkConfig
+
+    try:
+        with import_library("safetensors").safe_open(path, framework="pt") as file:
+            metadata = file.metadata() or {}
+            tensors = {name: file.get_tensor(name).to(torch.float32) for name in file.keys()}  # noqa: SIM118
+        if metadata.get("format") != FORMAT:
+            raise ValueError(f"its format is {metadata.get('format')}")
+        config = json.loads(metadata["network"])
+        network = ShapeNetwork(ShapeNetworkConfig(**{**config, "widths": tuple(config["widths"])}))
+        network.load_state_dict(tensors)
+    except Exception as error:  # safetensors' own exception, RuntimeError of torch, OSError
+        raise WeightsError(
+            "The weights of the completion cannot be read",
+            where=path,
+            expected=FORMAT,
+            found=error,
+            fix="install brrp-cli again",
+        ) from error
+    return network.eval().requires_grad_(False)
+
+
+@cache
+def shapes() -> ShapeNetwork:
+    """The network that comes with the package."""
+    with as_file(files("brrp_cli.completion") / NAME) as path:
+        return load_shapes(path)

@@ -1,0 +1,129 @@
+"""The command that trains the completion, on two small scenes, as people run it."""
+
+import json
+import shutil
+
+import numpy as np
+import pytest
+import torch
+from click.testing import CliRunner
+from tiny_scenes import write_meshes, write_scene
+from train_completion import main
+from training.completion import ShapeNetworkConfig, draw_batch, scores, started
+from training.completion_examples import held_names, read_examples
+
+from brrp_cli.completion.learned import load_shapes
+from brrp_cli.completion.network import fitted
+
+# With this seed the small images are seen by a camera that does not lose what they show, and the
+# ball is kept to validate.
+SMALL = ["--views", "1", "--cooling", "0", "--batch", "2", "--points", "16", "--seed", "1"]
+
+
+def run(*arguments):
+    result = CliRunner().invoke(main, [*map(str, arguments)])
+    if result.exception is not None and not isinstance(result.exception, SystemExit):
+        raise result.exception
+    return result
+
+
+@pytest.fixture(scope="module")
+def place(tmp_path_factory):
+    """Two scenes, and a folder with their examples."""
+    folder = tmp_path_factory.mktemp("fit")
+    write_meshes(folder / "shapes")
+    write_scene(folder / "scenes" / "00000000", {1: ("can", 0.07, 0.0), 2: ("ball", -0.08, 0.02)})
+    write_scene(folder / "scenes" / "00000001", {1: ("box", 0.0, 0.02)}, yaw=1.0)
+    result = run(f"{folder / 'scenes'}:{folder}", "-o", folder / "made", *SMALL, "--examples-only")
+    assert result.exit_code == 0, result.output
+    return folder
+
+
+def history(folder):
+    records = json.loads((folder / "history.json").read_text())
+    return [{k: v for k, v in record.items() if k != "seconds"} for record in records]
+
+
+def examples_of(place):
+    return read_examples(sorted((place / "made" / "examples").glob("*/*.npz")))
+
+
+def test_examples_are_labelled_points_in_volumes(place):
+    found = examples_of(place)
+    assert sorted(found.names) == ["ball", "box", "can"]
+    assert len(found.lengths) == len(found.places) == len(found.inside) == found.starts[-1]
+    assert 0.1 < found.inside.mean() < 0.9
+    assert np.isfinite(found.lengths.astype(float)).all()
+    one = found.only(np.array([1]))
+    assert one.names == found.names[1:2] and len(one.inside) == np.diff(found.starts)[1]
+    # What is inside lies in the middle of the volume, and what does not, around it.
+    assert np.abs(one.places[one.inside].astype(float)).max() < 1.2
+
+
+def test_it_begins_as_the_network_of_lengths(place):
+    found = examples_of(place)
+    network = started(ShapeNetworkConfig(), fitted(), 0).eval()
+    lengths = torch.from_numpy(found.lengths[:300].astype(np.float32))
+    with torch.no_grad():
+        nothing = torch.zeros(len(lengths), network.config.features)
+        logits = network.decide(network.scaled(lengths), nothing).numpy()
+    np.testing.assert_allclose(logits, fitted().logits(lengths.numpy()), atol=1e-3)
+
+
+def test_mirrored_objects_are_mirrored_whole(place):
+    found = examples_of(place)
+    rows, flips = np.arange(3), 0
+    for seed in range(4):
+        volumes, _, places, _ = draw_batch(found, rows, 8, np.random.default_rng(seed))
+        rng = np.random.default_rng(seed)
+        counts = np.diff(found.starts)
+        drawn = found.starts[:-1][:, None] + rng.integers(counts[:, None], size=(3, 8))
+        for row in rows:
+            as_it_is = found.volumes[row].astype(np.float32) / 127
+            place_of = found.places[drawn[row]].astype(np.float32)
+            flipped = not np.array_equal(volumes[row].numpy(), as_it_is)
+            flips += flipped
+            if flipped:
+                np.testing.assert_array_equal(volumes[row].numpy(), as_it_is[:, ::-1])
+            sign = [-1, 1, 1] if flipped else [1, 1, 1]
+            np.testing.assert_array_equal(places[row].numpy(), place_of * sign)
+    assert 0 < flips < 12
+
+
+def test_scores_of_what_is_known(place):
+    found = examples_of(place)
+    right = scores(np.where(found.inside, 9.0, -9.0), found)
+    assert right["iou"] == 1 and right["volume"] == 1 and right["nll"] < 1e-3
+    assert scores(np.zeros(len(found.inside)), found)["nll"] == pytest.approx(np.log(2))
+
+
+def test_shapes_are_kept_by_name():
+    names = [f"shape {i}" for i in range(400)]
+    kept = held_names(names + names, 0.1, 0)
+    assert 20 < len(kept) < 60 and kept < set(names)
+    assert held_names(names[:50], 0.1, 0) == kept & set(names[:50])
+
+
+@pytest.mark.slow
+def test_trains_and_goes_on_as_if_it_had_not_stopped(place, tmp_path):
+    whole, parted = tmp_path / "whole", tmp_path / "parted"
+    for folder in (whole, parted):
+        shutil.copytree(place / "made", folder)
+    held = ["--validation", 0.5]
+    result = run("-o", whole, "--epochs", 2, *SMALL, *held)
+    assert result.exit_code == 0, result.output
+    stopped = run("-o", parted, *SMALL, *held, "--minutes", 0)
+    assert "the same command goes on" in stopped.output
+    assert run("-o", parted, "--epochs", 1, *SMALL, *held).exit_code == 0
+    assert "Going on after epoch 1" in run("-o", parted, "--epochs", 2, *SMALL, *held).output
+    assert history(parted) == history(whole)
+    one, two = (load_shapes(folder / "shapes.safetensors") for folder in (whole, parted))
+    for a, b in zip(one.state_dict().values(), two.state_dict().values(), strict=True):
+        assert torch.equal(a, b)
+    refused = run("-o", parted, "--epochs", 2, *SMALL, *held, "--rate", 0.1)
+    assert refused.exit_code == 1 and "holds another training" in refused.output
+
+
+def test_tells_what_is_missing(tmp_path):
+    result = run("-o", tmp_path / "out")
+    assert result.exit_code == 1 and "There are no examples" in result.output

@@ -1,0 +1,158 @@
+"""Train the completion that has learned shapes (brrp_cli/completion/shape_network.py).
+
+    python tools/train_completion.py house:. drawn:. ycb_scenes:. random:. composed:. -o train
+
+SCENES:DATA_ROOT are scenes of `tools/make_scenes.py` without noise, the same as those of
+`tools/fit_completion.py`, whose docstring has the commands. Every view becomes a frame of one of
+several depth cameras, or of none, some with masks that lie beside their objects
+(training/completion_examples.py). First every object of every view becomes an example, a volume and
+labelled points with their lengths, in OUTPUT/examples. Then the network is trained, which begins as
+the network of lengths that comes with the package. The same command goes on where it was stopped or
+killed; more --epochs lengthen a training that is over.
+
+Some shapes, by name, are kept to validate. OUTPUT/shapes.safetensors has the weights of the epoch
+with the least loss on them, with a temperature that was fitted to them; copied to
+brrp_cli/completion/, it is what the package completes with. history.json has the losses of each
+epoch, the last line of the output those of the network of lengths on the same points.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections import Counter
+from pathlib import Path
+from time import monotonic
+
+import click
+import numpy as np
+from tqdm import tqdm
+
+# The script also runs from a checkout that is not installed.
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+from train_pointsdf import signalled
+
+from brrp_cli.completion.learned import NAME, save_shapes
+from brrp_cli.completion.network import fitted
+from brrp_cli.errors import BrrpError
+from brrp_cli.ground_truth.scenes import find_scenes
+
+
+@click.command()
+@click.argument("sets", nargs=-1)
+@click.option("-o", "--output", required=True, type=click.Path(path_type=Path))
+@click.option("--views", default=2, show_default=True, type=click.IntRange(1))
+@click.option("--epochs", default=6, show_default=True, type=click.IntRange(1))
+@click.option(
+    "--cooling", default=5, show_default=True, type=click.IntRange(0), help="Last epochs."
+)
+@click.option("--batch", default=8, show_default=True, type=click.IntRange(1), help="Objects.")
+@click.option("--points", default=512, show_default=True, type=click.IntRange(1))
+@click.option("--rate", default=2e-3, show_default=True, type=float, help="Of AdamW.")
+@click.option(
+    "--validation",
+    default=0.08,
+    show_default=True,
+    type=click.FloatRange(0, 0.5),
+    help="Share of the shapes.",
+)
+@click.option("--seed", default=0, show_default=True)
+@click.option("--minutes", type=click.FloatRange(0), help="Stop, to go on later, after so long.")
+@click.option("--examples-only", is_flag=True, help="Make the examples and stop.")
+def main(
+    sets: tuple[str, ...],
+    output: Path,
+    views: int,
+    epochs: int,
+    cooling: int,
+    batch: int,
+    points: int,
+    rate: float,
+    validation: float,
+    seed: int,
+    minutes: float | None,
+    examples_only: bool,
+) -> None:
+    """Train on SETS, each SCENES:DATA_ROOT, or on the examples that are in OUTPUT already."""
+    from training.completion import Training, TrainingConfig, scores
+    from training.completion_examples import held_names, make_all, read_examples
+
+    from brrp_cli.completion.shape_network import ShapeNetworkConfig
+
+    began = monotonic()
+    try:
+        if cooling > epochs:
+            raise BrrpError("--cooling is a part of --epochs", found=f"{cooling} of {epochs}")
+        folder = output / "examples"
+        wanted = []
+        for each in sets:
+            scenes, _, root = each.partition(":")
+            found = find_scenes(Path(scenes))
+            wanted += [(scene, view, Path(root)) for scene in found for view in range(views)]
+        for _ in tqdm(make_all(wanted, seed, folder), desc="examples", total=len(wanted)):
+            pass
+        paths = sorted(folder.glob("*/*.npz"))
+        if not paths:
+            raise BrrpError("There are no examples", where=folder, fix="name SETS to make them of")
+        if examples_only:
+            click.echo(f"Examples of {len(paths)} views: {folder}/")
+            return
+        every = read_examples(paths)
+        kept = held_names(every.names, validation, seed)
+        of_held = np.array([name in kept for name in every.names])
+        train, held = (every.only(np.flatnonzero(which)) for which in (~of_held, of_held))
+        if not len(train) or not len(held):
+            raise BrrpError(
+                "There is too little to train on or to validate with",
+                where=folder,
+                found=f"{len(train)} and {len(held)} objects",
+                fix="make more scenes",
+            )
+        del every
+        config = TrainingConfig(epochs, cooling, batch, points, rate, seed=seed)
+        training = Training(ShapeNetworkConfig(), config, output, len(train))
+        done, steps = training.progress, len(training.batches(len(train), 0))
+        if done.epoch or done.step:
+            click.echo(f"Going on after epoch {done.epoch}, step {done.step}", err=True)
+        total = epochs * steps
+        with tqdm(total=total, initial=done.epoch * steps + done.step, desc="steps") as bar:
+
+            def stepped(loss: float) -> None:
+                bar.set_postfix(loss=f"{loss:.4f}", refresh=False)
+                bar.update()
+
+            def ended(record: dict[str, float]) -> None:
+                bar.write(", ".join(f"{name} {value:.4g}" for name, value in record.items()))
+
+            with signalled() as stop:
+
+                def go_on() -> bool:
+                    late = minutes is not None and monotonic() - began >= 60 * minutes
+                    return not (late or stop.is_set())
+
+                finished = training.run(train, held, go_on=go_on, stepped=stepped, ended=ended)
+    except BrrpError as error:
+        raise click.ClickException(str(error)) from error
+    if not finished:
+        click.echo(f"Stopped in epoch {done.epoch + 1}; the same command goes on")
+        return
+    best = training.best(held)
+    record = min(done.history, key=lambda each: each["nll"])
+    lengths = scores(fitted().logits(held.lengths.astype(np.float32)).astype(np.float64), held)
+    about = {
+        "objects": len(train),
+        "shapes": len(Counter(train.names)),
+        "validation_objects": len(held),
+        "validation_shapes": len(Counter(held.names)),
+        "points": len(train.inside),
+        "temperature": float(best.temperature),
+        "best": record,
+        "lengths": lengths,
+    }
+    save_shapes(best, about, output / NAME)
+    click.echo(f"Network of lengths: {lengths}; of shapes: {record}")
+    click.echo(f"Wrote {output / NAME} ({(output / NAME).stat().st_size} bytes)")
+
+
+if __name__ == "__main__":
+    main()

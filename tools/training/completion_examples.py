@@ -1,0 +1,213 @@
+"""Examples of objects that are to be completed, made from scenes once and kept as .npz.
+
+One file for each view of a scene, SET/NAME_VIEW.npz, of its N objects:
+
+    volumes   (N, CHANNELS, n, n, n) int8, of brrp_cli/completion/volume.py
+    lengths   (P, 72) float16, of point_features.py, at all points of all objects
+    places    (P, 3) float16, of the points, in the volumes
+    inside    (P,) bool, in the exact mesh
+    counts    (N,) points of each object; names (N,)
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from io import BytesIO
+from pathlib import Path
+
+import numpy as np
+from fit_completion import MIN_PIXELS, asked_points, is_inside, solid_of
+from numpy.typing import NDArray
+from scipy.ndimage import binary_dilation
+
+from brrp_cli.completion.completed_mean import empty_space
+from brrp_cli.completion.point_features import COUNT, point_features
+from brrp_cli.completion.visible_part import visible_part
+from brrp_cli.completion.volume import CHANNELS, volume_of
+from brrp_cli.config import HypothesesConfig, preset
+from brrp_cli.depth_noise.registry import VIEW_SENSORS
+from brrp_cli.depth_noise.view import View
+from brrp_cli.evaluation.perturb import shift_masks, with_noise
+from brrp_cli.files import write_bytes
+from brrp_cli.frames.frame import BACKGROUND, Frame
+from brrp_cli.geometry import backproject, normalise, transform_points
+from brrp_cli.ground_truth.scenes import Scene
+from brrp_cli.observation.ray_samples import box_center
+from brrp_cli.observation.support_plane import fit_plane
+from brrp_cli.seeds import child_rng
+
+# What the frame of a scene without noise is seen through, and how often.
+SENSORS = {"none": 0.1, "structured-light": 0.45, "xtion": 0.35, "kinect-azure": 0.1}
+ALBEDO = (0.2, 0.9)  # of everything in the frame, what it shows to an infrared camera
+# Masks as they are, moved aside or grown, and by how many pixels.
+SHIFTED, GROWN, PIXELS = 0.15, 0.15, 2
+DRAWS = 2  # of the points that an object is asked at
+
+
+@dataclass(frozen=True)
+class Examples:
+    """As the files hold them; starts (N + 1,) of the objects' points."""
+
+    volumes: NDArray[np.int8]
+    lengths: NDArray[np.float16]
+    places: NDArray[np.float16]
+    inside: NDArray[np.bool_]
+    starts: NDArray[np.int64]
+    names: tuple[str, ...]
+
+    def __len__(self) -> int:
+        return len(self.volumes)
+
+    def only(self, rows: NDArray[np.int64]) -> Examples:
+        """The objects `rows`."""
+        spans = [np.arange(self.starts[i], self.starts[i + 1]) for i in rows]
+        points = np.concatenate([np.zeros(0, np.int64), *spans])
+        return Examples(
+            self.volumes[rows],
+            self.lengths[points],
+            self.places[points],
+            self.inside[points],
+            np.cumsum([0, *(len(span) for span in spans)]),
+            tuple(self.names[i] for i in rows),
+        )
+
+
+def make_view(scene: Scene, view: int, data_root: Path, seed: int, path: Path) -> None:
+    """Write the examples of a view of a scene without noise, whole or not at all."""
+    rng = child_rng(seed, scene.folder.parent.name, scene.name, view)
+    write_bytes(path, _as_bytes(view_examples(scene, scene.view(view), data_root, seed, rng)))
+
+
+def view_examples(
+    scene: Scene, clean: Frame, data_root: Path, seed: int, rng: np.random.Generator
+) -> list[
+    tuple[NDArray[np.int8], NDArray[np.float16], NDArray[np.float16], NDArray[np.bool_], str]
+]:
+    """Volume, lengths, places, inside and name of each object that can be used."""
+    config = preset("default")
+    hypotheses = config.hypotheses
+    assert hypotheses is not None
+    frame = _worse_masks(through_a_sensor(clean, rng), rng)
+    T_world_cam = frame.T_world_cam
+    assert T_world_cam is not None
+    clouds = {i: frame.object_points(i) for i in frame.object_ids}
+    clouds = {i: points for i, points in clouds.items() if len(points) >= MIN_PIXELS}
+    if not clouds:
+        return []
+    middle = np.mean([box_center(points) for points in clouds.values()], axis=0)
+    ground = frame.points[frame.valid & (frame.segmap == BACKGROUND)]
+    plane = fit_plane(ground, config.observation, seed, middle)
+    found = []
+    for object_id, cloud in clouds.items():
+        true = scene.object(object_id)
+        solid = solid_of(true.mesh_path, data_root)
+        if solid is None:
+            continue
+        part = visible_part(cloud, frame, object_id, plane, hypotheses.completion)
+        points = np.concatenate([asked_points(part, rng) for _ in range(DRAWS)])
+        points = points[~empty_space(points, frame, object_id, plane, hypotheses.mean)]
+        if not len(points):
+            continue
+        volume = volume_of(part, hypotheses.completion.volume)
+        in_file = transform_points(np.linalg.inv(true.T_world_object) @ T_world_cam, points)
+        found.append(
+            (
+                volume.values,
+                point_features(points, part).astype(np.float16),
+                np.clip(volume.places(points), -4, 4).astype(np.float16),
+                is_inside(in_file, solid),
+                true.name,
+            )
+        )
+    return found
+
+
+def through_a_sensor(frame: Frame, rng: np.random.Generator) -> Frame:
+    """The frame as one of `SENSORS` would have seen it."""
+    name = str(rng.choice([*SENSORS], p=[*SENSORS.values()]))
+    if name == "none":
+        return frame
+    if name == "structured-light":
+        return with_noise(frame, rng)
+    depth = np.where(frame.valid, frame.points[..., 2], 0.0)
+    albedo = np.full(depth.shape, rng.uniform(*ALBEDO))
+    view = View(depth, frame.K, _normals(depth, frame), albedo, np.zeros(depth.shape))
+    measured = VIEW_SENSORS[name].measure(view, rng)
+    return replace(frame, points=backproject(measured, frame.K))
+
+
+def _normals(depth: NDArray[np.float64], frame: Frame) -> NDArray[np.float64]:
+    points = backproject(depth, frame.K)
+    down, right = np.gradient(np.nan_to_num(points), axis=(0, 1))
+    return normalise(np.cross(right, down) + np.array([0, 0, 1e-12]))
+
+
+def _worse_masks(frame: Frame, rng: np.random.Generator) -> Frame:
+    kind, pixels = rng.random(), int(rng.integers(1, PIXELS + 1))
+    if kind < SHIFTED:
+        return shift_masks(frame, int(rng.choice([-1, 1])) * pixels)
+    if kind > SHIFTED + GROWN:
+        return frame
+    segmap = frame.segmap.copy()
+    for object_id in frame.object_ids:
+        grown = binary_dilation(frame.segmap == object_id, iterations=pixels)
+        segmap[grown & (frame.segmap == BACKGROUND)] = object_id
+    return replace(frame, segmap=segmap)
+
+
+def _as_bytes(found: list) -> bytes:
+    side = _side()
+    buffer = BytesIO()
+    np.savez_compressed(
+        buffer,
+        volumes=np.array([each[0] for each in found], np.int8).reshape(-1, CHANNELS, *(side,) * 3),
+        lengths=np.concatenate([np.zeros((0, COUNT), np.float16), *(each[1] for each in found)]),
+        places=np.concatenate([np.zeros((0, 3), np.float16), *(each[2] for each in found)]),
+        inside=np.concatenate([np.zeros(0, bool), *(each[3] for each in found)]),
+        counts=np.array([len(each[3]) for each in found], np.int64),
+        names=np.array([each[4] for each in found], "U"),
+    )
+    return buffer.getvalue()
+
+
+def _side() -> int:
+    return HypothesesConfig().completion.volume.side
+
+
+def read_examples(paths: Sequence[Path]) -> Examples:
+    """The examples of all files, one after the other."""
+    arrays: dict[str, list] = {}
+    for path in paths:
+        with np.load(path, allow_pickle=False) as file:
+            for name in file.files:
+                arrays.setdefault(name, []).append(file[name])
+    joined = {}
+    for name in list(arrays):
+        joined[name] = np.concatenate(arrays.pop(name))
+    return Examples(
+        joined["volumes"],
+        joined["lengths"],
+        joined["places"],
+        joined["inside"],
+        np.concatenate([[0], np.cumsum(joined["counts"])]),
+        tuple(str(name) for name in joined["names"]),
+    )
+
+
+def make_all(wanted: Sequence[tuple[Scene, int, Path]], seed: int, folder: Path) -> Iterator[Path]:
+    """Write what is missing of the examples of (scene, view, data root) into `folder`, all first
+    views first; yields each one's file."""
+    for scene, view, data_root in sorted(wanted, key=lambda each: (each[1], each[0].name)):
+        path = folder / scene.folder.parent.name / f"{scene.name}_{view}.npz"
+        if not path.exists():
+            path.parent.mkdir(parents=True, exist_ok=True)
+            make_view(scene, view, data_root, seed, path)
+        yield path
+
+
+def held_names(names: Sequence[str], share: float, seed: int) -> frozenset[str]:
+    """Shapes that are kept to validate: whether one is depends on its name and the seed alone."""
+    return frozenset(
+        name for name in set(names) if child_rng(seed, "validation", name).random() < share
+    )
