@@ -15,7 +15,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from brrp_cli.config import Config
+from brrp_cli.config import Config, SensorConfig
 from brrp_cli.config.retrieval import FusionConfig
 from brrp_cli.errors import RetrievalError
 from brrp_cli.frames.frame import BACKGROUND, Frame
@@ -97,7 +97,9 @@ class AppearanceRetriever:
         if plane is None:
             return {i: replace(look, alignment=own.alignment.neutral) for i, look in looks.items()}
         likely = self._believe(list(looks.values()), own.likeness)
-        wave = wave_deviation(frame, plane, self._config.hypotheses.sensor)
+        hypotheses = self._config.hypotheses
+        sensor = SensorConfig() if hypotheses is None else hypotheses.sensor
+        wave = wave_deviation(frame, plane, sensor)
         return {
             i: self._aligned(look, probabilities[look.rows], points[i], frame, plane, wave)
             for (i, look), probabilities in zip(looks.items(), likely, strict=True)
