@@ -42,9 +42,9 @@ def aligner(prior):
     return retriever_of(prior, True)
 
 
-def retriever_of(prior, aligned):
+def retriever_of(prior, aligned, name="default"):
     """Of a small prior, whose objects are aligned only where that is asked for."""
-    config = preset("default")
+    config = preset(name)
     if aligned:
         alignment = dataclasses.replace(config.retrieval.alignment, from_objects=1)
         own = dataclasses.replace(config.retrieval, alignment=alignment)
@@ -71,6 +71,15 @@ def test_the_true_object_is_first_in_any_light(prior, retriever, light):
         assert probabilities.sum() <= 1 + 1e-9
         assert prior.names[int(probabilities.argmax())] == name
         assert unknown(probabilities) < 0.5
+
+
+def test_the_papers_preset_aligns_as_the_default_does(prior, aligner):
+    frame, names = scene()
+    paper = retriever_of(prior, True, "paper")
+    for object_id in names:
+        np.testing.assert_allclose(
+            paper.probabilities(frame, object_id), aligner.probabilities(frame, object_id)
+        )
 
 
 def test_a_stranger_is_told(retriever):
