@@ -92,8 +92,11 @@ def load_shapes(path: Path) -> ShapeNetwork:
         if metadata.get("format") != FORMAT:
             raise ValueError(f"its format is {metadata.get('format')}")
         config = json.loads(metadata["network"])
-        network = ShapeNetwork(ShapeNetworkConfig(**{**config, "widths": tuple(config["widths"])}))
-        network.load_state_dict(tensors)
+        widths = tuple(config.pop("widths"))
+        # Without numbers of its own: none are drawn from torch's random state.
+        with torch.device("meta"):
+            network = ShapeNetwork(ShapeNetworkConfig(**config, widths=widths))
+        network.load_state_dict(tensors, assign=True)
     except Exception as error:  # safetensors' own exception, RuntimeError of torch, OSError
         raise WeightsError(
             "The weights of the completion cannot be read",
