@@ -187,7 +187,8 @@ def _scene_rows(
             }
             if not grasps:
                 why = of[object_id].why if object_id in of else "it has no mesh"
-                none = {"result": "none", "why": why, "score": None, "drift": None}
+                none = {"result": "none", "why": why, "score": None}
+                none["drift"] = trials.drift[object_id]
                 yield row | {"rank": RANKS[0]} | none
                 continue
             tried: dict[int | str, Grasp] = dict(zip(RANKS, grasps, strict=False))
