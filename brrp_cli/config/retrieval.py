@@ -160,7 +160,7 @@ class ShortlistConfig:
     and shape, of which `closely` are kept by size too; light_step : of every so many-th light
     """
 
-    closely: int = 1_024
+    closely: int = 256
     roughly: int = 2_000
     light_step: int = 8
 
