@@ -15,7 +15,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from brrp_cli.config import Config, SensorConfig
+from brrp_cli.config import Config, HypothesesConfig
 from brrp_cli.config.retrieval import FusionConfig
 from brrp_cli.errors import RetrievalError
 from brrp_cli.frames.frame import BACKGROUND, Frame
@@ -56,6 +56,9 @@ class AppearanceRetriever:
         self._similarity = own.similarity
         if not self._aligns:
             self._similarity = replace(own.similarity, blur=0.0, size_most=np.inf)
+        # The paper's preset has no numbers of its own for the sensor.
+        hypotheses = config.hypotheses or HypothesesConfig()
+        self._sensor = hypotheses.sensor
         self._frame: Frame | None = None
         self._answers: dict[int, NDArray[np.float64]] = {}
 
@@ -97,9 +100,7 @@ class AppearanceRetriever:
         if plane is None:
             return {i: replace(look, alignment=own.alignment.neutral) for i, look in looks.items()}
         likely = self._believe(list(looks.values()), own.likeness)
-        hypotheses = self._config.hypotheses
-        sensor = SensorConfig() if hypotheses is None else hypotheses.sensor
-        wave = wave_deviation(frame, plane, sensor)
+        wave = wave_deviation(frame, plane, self._sensor)
         return {
             i: self._aligned(look, probabilities[look.rows], points[i], frame, plane, wave)
             for (i, look), probabilities in zip(looks.items(), likely, strict=True)
