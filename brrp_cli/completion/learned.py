@@ -60,7 +60,8 @@ class LearnedShape:
         lengths = torch.from_numpy(point_features(np.asarray(points, np.float64), self.part))
         with torch.no_grad():
             found = network.at(self.features, places[None])[0]
-            return np.asarray(network.decide(network.scaled(lengths), found).numpy())
+            thought = network.decide(network.scaled(lengths), found).numpy()
+        return np.asarray(thought + np.float32(self.part.config.bias))
 
 
 def save_shapes(network: ShapeNetwork, training: dict[str, Any], path: Path) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from brrp_cli.config.ranges import share
+from brrp_cli.config.ranges import between, share
 
 
 @dataclass(frozen=True)
@@ -82,6 +82,8 @@ class CompletionConfig:
 
     learned : by the network that has learned shapes, which sees the object's surroundings as a
         `volume`; otherwise by a smaller one that sees lengths at a point alone
+    bias : nats added to its log odds: a network that is right at each point on average makes thin
+        things, whose place is in doubt, thinner than they are
     cell : metres, of grids in which observed points are merged; closing : gaps of fewer cells are
     closed
 
@@ -104,6 +106,7 @@ class CompletionConfig:
     """
 
     learned: bool = True
+    bias: float = between(0.2, -5.0, 5.0)
     cell: float = 0.004
     closing: int = 7
     least: float = 0.005

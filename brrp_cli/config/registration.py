@@ -166,7 +166,7 @@ class SearchConfig:
     kept: int = 6
     alignment_score: VerificationConfig = field(default_factory=VerificationConfig)
     colour: ColourConfig = field(default_factory=ColourConfig)
-    turn: TurnConfig = field(default_factory=TurnConfig)
+    about_itself: TurnConfig = field(default_factory=TurnConfig)
 
 
 @dataclass(frozen=True)

@@ -45,7 +45,7 @@ def turned(placed: Hypothesis, verifier: Verifier, patch: float, config: SearchC
 
     patch : metres; pixels within one err together and are one vote
     """
-    turn = config.turn
+    turn = config.about_itself
     start = _nearly_itself(placed, turn)
     if not len(start):
         return Turned(placed, np.empty((0, 4, 4)))
@@ -140,7 +140,7 @@ def _as_much_explained(
         model_points=config.fine_points,
         seen_points=config.fine_points,
     )
-    return np.asarray(score >= score[0] - config.turn.alike)
+    return np.asarray(score >= score[0] - config.about_itself.alike)
 
 
 def _as_much_alike(

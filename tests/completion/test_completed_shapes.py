@@ -68,7 +68,7 @@ def test_what_is_looked_into_is_hollow_with_walls(name):
     """Less than half of what it would be if it were full, and not much less than it is."""
     true = HOLLOW[name]
     mesh = completed_mesh({5: in_camera(true, placed(0.0, 0.0, 0.3))})
-    assert mesh.volume > 0.55 * true.volume
+    assert mesh.volume > 0.6 * true.volume
     assert mesh.volume < 0.6 * true.convex_hull.volume
 
 
