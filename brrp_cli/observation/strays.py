@@ -33,7 +33,7 @@ def without_strays(frame: Frame, config: StrayConfig) -> Frame:
             stray[window] |= found
             if found.any():
                 log.info(
-                    "Object %d: %d pixels of its mask are far from it and left out",
+                    "Object %d: its mask is left without %d pixel(s) far from the object",
                     object_id,
                     found.sum(),
                 )
