@@ -37,6 +37,17 @@ def as_transforms(rotations: NDArray[np.float64]) -> NDArray[np.float64]:
     return T
 
 
+def cells_of(points: NDArray[np.floating], cell: float) -> NDArray[np.int64]:
+    """(n,) number, from 0 on and without gaps, of the grid cell of `cell` that each of points
+    (n, d) lies in; in the order of the cells, the last coordinate fastest."""
+    if not len(points):
+        return np.empty(0, np.int64)
+    cells = np.floor(points / cell).astype(np.int64)
+    cells -= cells.min(axis=0)
+    index = np.ravel_multi_index(tuple(cells.T), tuple(cells.max(axis=0) + 1))
+    return np.unique(index, return_inverse=True)[1].reshape(-1)
+
+
 def backproject(depth: Array, K: Array) -> NDArray[np.float32]:
     """Depth (H, W), metres along z, to points (H, W, 3), metres, camera frame.
 

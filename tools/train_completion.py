@@ -30,7 +30,7 @@ from tqdm import tqdm
 # The script also runs from a checkout that is not installed.
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from train_pointsdf import signalled
+from training.interrupted import signalled
 
 from brrp_cli.completion.learned import NAME, save_shapes
 from brrp_cli.completion.network import fitted

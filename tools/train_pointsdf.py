@@ -22,13 +22,9 @@ history.json has losses and IoU of each epoch.
 
 from __future__ import annotations
 
-import signal
 import sys
 from collections import Counter
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
-from threading import Event
 from time import monotonic
 
 import click
@@ -38,6 +34,7 @@ from tqdm import tqdm
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from training.examples import TRUTHS, Recipe, make_examples, read_examples
+from training.interrupted import signalled
 
 from brrp_cli.errors import BrrpError
 from brrp_cli.evaluation.request import find_data_root
@@ -177,25 +174,6 @@ def main(
     if not finished:
         click.echo(f"Stopped in epoch {done.epoch + 1}; the same command goes on")
     click.echo(f"Wrote {output}/ ({weights.name}, history.json, checkpoint.pt)")
-
-
-@contextmanager
-def signalled() -> Iterator[Event]:
-    """An event that Ctrl-C or SIGTERM sets, so that the step at work is ended and kept; a second
-    Ctrl-C does not wait for it."""
-    stop = Event()
-
-    def note(number: int, frame: object) -> None:
-        if stop.is_set():
-            raise KeyboardInterrupt
-        stop.set()
-
-    before = {number: signal.signal(number, note) for number in (signal.SIGINT, signal.SIGTERM)}
-    try:
-        yield stop
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
 
 
 if __name__ == "__main__":

@@ -19,7 +19,8 @@ class SurfaceConfig:
     `spacing`.
     around_nodes : of the grid on which the confidence surface around a stored mesh is found, whose
     spacing is `around_finest` metres at least
-    fidelity : metres, standard deviation of a stored mesh from its object
+    fidelity : metres, standard deviation of a stored mesh from its object; band_draws : of the
+    pose, from which the width of the band around it follows, looked at in `band_vertices` vertices
     keep_distance : metres; a component of the level set further from every observed point is
     hallucinated
     one_piece : whether an object is one piece; the published methods keep every part near what was
@@ -50,6 +51,8 @@ class SurfaceConfig:
     wall_share: float = share(0.4)
     steps: int = 17
     fidelity: float = 0.0002
+    band_draws: int = 4_000
+    band_vertices: int = 300
     around_nodes: int = 1_000_000
     around_finest: float = 0.001
     most_off: float = share(0.05)

@@ -10,6 +10,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from brrp_cli.geometry import cells_of
+
 # Metres; finer where small things differ.
 DISTANCES = np.array(
     [0, 0.01, 0.02, 0.03, 0.04, 0.05, 0.065, 0.08, 0.1, 0.12, 0.15, 0.18, 0.22, 0.27, 0.33, 0.4]
@@ -59,16 +61,8 @@ def _thinned(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     if len(points) == 0:
         return points, normals
-    cells = np.floor(points / CELL).astype(np.int64)
-    cells -= cells.min(axis=0)
-    rows = np.sort(np.unique(_numbered(cells), return_index=True)[1])
+    rows = np.sort(np.unique(cells_of(points, CELL), return_index=True)[1])
     if len(rows) > MAX_POINTS:
         # A fixed draw: descriptors are not to hang on a seed.
         rows = np.sort(np.random.default_rng(0).choice(rows, MAX_POINTS, replace=False))
     return points[rows], normals[rows]
-
-
-def _numbered(cells: NDArray[np.int64]) -> NDArray[np.int64]:
-    """One number (n,) for each cell (n, 3), whose coordinates are 0 or more."""
-    size = cells.max(axis=0) + 1
-    return np.asarray((cells[:, 0] * size[1] + cells[:, 1]) * size[2] + cells[:, 2])

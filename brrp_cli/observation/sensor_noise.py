@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from brrp_cli.config import SensorConfig
 from brrp_cli.frames.frame import BACKGROUND, Frame
-from brrp_cli.observation.subsample import cells_of
+from brrp_cli.geometry import cells_of
 from brrp_cli.observation.support_plane import Plane, plane_frame
 
 Array = NDArray[np.float64]

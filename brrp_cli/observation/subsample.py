@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from brrp_cli.geometry import cells_of
+
 _DENSE_CELLS = 2**22
 
 
@@ -30,17 +32,6 @@ def grid_subsample(points: NDArray[np.floating], cell: float) -> NDArray[np.floa
     occupied = count > 0
     sums = np.stack([np.bincount(index, weights=column)[occupied] for column in columns], axis=-1)
     return (sums / count[occupied, None]).astype(np.float32)
-
-
-def cells_of(points: NDArray[np.floating], cell: float) -> NDArray[np.int64]:
-    """(n,) number, from 0 on and without gaps, of the grid cell of `cell` that each of points
-    (n, d) lies in; in the order of the cells, the last coordinate fastest."""
-    if not len(points):
-        return np.empty(0, np.int64)
-    cells = np.floor(points / cell).astype(np.int64)
-    cells -= cells.min(axis=0)
-    index = np.ravel_multi_index(tuple(cells.T), tuple(cells.max(axis=0) + 1))
-    return np.unique(index, return_inverse=True)[1].reshape(-1)
 
 
 def dense_points(

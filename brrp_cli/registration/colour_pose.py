@@ -15,8 +15,7 @@ from scipy.spatial.transform import Rotation
 from brrp_cli.config import ColourConfig
 from brrp_cli.frames.frame import Frame
 from brrp_cli.frames.projection import depth_behind, pixel_numbers
-from brrp_cli.geometry import transform_points
-from brrp_cli.observation.subsample import cells_of
+from brrp_cli.geometry import cells_of, transform_points
 from brrp_cli.registration.model import Model
 
 Array = NDArray[np.float64]

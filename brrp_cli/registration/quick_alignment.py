@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from brrp_cli.config import SearchConfig
-from brrp_cli.geometry import normalise
+from brrp_cli.geometry import as_transforms, normalise
 from brrp_cli.observation.support_plane import Plane
 from brrp_cli.registration.initial_poses import resting_initial_poses
 from brrp_cli.registration.model import ModelGeometry
@@ -156,8 +156,7 @@ def turned_poses(model: ModelGeometry, seen: Array, config: SearchConfig) -> Arr
     furthest = np.where(facing[:, None], placed, -np.inf).max(axis=-1)
     shift = (low + high) / 2 - (nearest + furthest) / 2
     shift[:, 2] = low[2] - nearest[:, 2]
-    T = np.tile(np.eye(4), (len(rotations), 1, 1))
-    T[:, :3, :3] = rotations
+    T = as_transforms(rotations)
     T[:, :3, 3] = shift @ T_sight_cam
     # A model none of whose points faces the camera cannot be laid over anything.
     return np.asarray(T[facing.any(axis=1)])

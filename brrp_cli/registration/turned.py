@@ -16,8 +16,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from brrp_cli.config import SearchConfig, TurnConfig
-from brrp_cli.geometry import as_transforms, transform_points
-from brrp_cli.observation.subsample import cells_of
+from brrp_cli.geometry import as_transforms, cells_of, transform_points
 from brrp_cli.registration.colour_pose import (
     best_and_different,
     textured_agreement,

@@ -50,10 +50,6 @@ from brrp_cli.surface.around_mesh import (
 from brrp_cli.surface.extract import grid_axes, level_set
 from brrp_cli.surface.stored_mesh import along_normals, moved_to_level, placed
 
-# Of the pose, and the vertices that are looked at: enough for two digits.
-DRAWS = 4_000
-DRAWN_VERTICES = 300
-
 # Which of points (n, 3), metres, camera frame, were seen to be empty: (n,) bool.
 Empty = Callable[[NDArray[np.float64]], NDArray[np.bool_]]
 
@@ -153,7 +149,7 @@ def _around_stored_mesh(
     if best.off > config.most_off:
         return None
     shape = placed(posterior, number)
-    by_pose = simultaneous(shape, confidence) * shape.deviations
+    by_pose = simultaneous(shape, confidence, config) * shape.deviations
     band = np.hypot(by_pose, norm.ppf((1 + confidence) / 2) * config.fidelity)
     moved = np.einsum("ni,ni->n", best.vertices - through.vertices, through.normals)
     # Where a vertex is a corner, its faces move by less than itself.
@@ -175,17 +171,17 @@ def _around_stored_mesh(
     return ConfidenceSurface(*found, confidence, 1 - confidence, bounded=True)
 
 
-def simultaneous(shape: PlacedShape, confidence: float) -> float:
+def simultaneous(shape: PlacedShape, confidence: float, config: SurfaceConfig) -> float:
     """How many standard deviations a band around the shape reaches outwards that holds its whole
     surface, moved by a draw from the covariance of its pose, with the given probability."""
-    rows = shape.motion_rows[:: max(1, len(shape.normals) // DRAWN_VERTICES)]
+    rows = shape.motion_rows[:: max(1, len(shape.normals) // config.band_vertices)]
     values, vectors = np.linalg.eigh(shape.covariance)
     along = rows @ (vectors * np.sqrt(np.maximum(values, 0.0)))
     deviations = np.linalg.norm(along, axis=1)
     along = along[deviations > 0] / deviations[deviations > 0, None]
     if not len(along):
         return 0.0
-    draws = child_rng(0, "simultaneous band").standard_normal((6, DRAWS))
+    draws = child_rng(0, "simultaneous band").standard_normal((6, config.band_draws))
     return float(np.quantile((along @ draws).max(axis=0), confidence))
 
 

@@ -212,11 +212,11 @@ def test_a_band_around_a_placed_shape_holds_all_of_it_at_once():
     ball = at(trimesh.creation.icosphere(subdivisions=4, radius=0.03))
     one, three = np.zeros((6, 6)), np.zeros((6, 6))
     one[3, 3], three[3:, 3:] = 1e-6, 1e-6 * np.eye(3)
-    found = simultaneous(replace(ball, covariance=one), 0.95)
+    found = simultaneous(replace(ball, covariance=one), 0.95, CONFIG)
     assert found == pytest.approx(norm.ppf(0.975), rel=0.04)
-    found = simultaneous(replace(ball, covariance=three), 0.95)
+    found = simultaneous(replace(ball, covariance=three), 0.95, CONFIG)
     assert found == pytest.approx(chi.ppf(0.95, 3), rel=0.04)
-    assert simultaneous(ball, 0.95) == 0, "a pose that is known"
+    assert simultaneous(ball, 0.95, CONFIG) == 0, "a pose that is known"
 
 
 def test_a_turn_that_is_as_probable_lies_inside():

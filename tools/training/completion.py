@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from time import monotonic
 from typing import Any
@@ -23,13 +23,18 @@ from torch.nn.functional import binary_cross_entropy_with_logits as cross_entrop
 from brrp_cli.completion.network import Network, fitted
 from brrp_cli.completion.point_features import WHOLE
 from brrp_cli.completion.shape_network import ShapeNetwork, ShapeNetworkConfig
-from brrp_cli.errors import BrrpError
-from brrp_cli.files import atomic_path, write_bytes
+from brrp_cli.files import atomic_path
 from brrp_cli.seeds import child_rng, child_seed
+from training.checkpoint import (
+    CHECKPOINT,
+    Progress,
+    cooled,
+    restore_checkpoint,
+    save_checkpoint,
+)
 from training.completion_examples import Examples
-from training.pointsdf import cooled
 
-CHECKPOINT, HISTORY, BEST = "checkpoint.pt", "history.json", "best.pt"
+BEST = "best.pt"
 # Of the loss of the volume's features alone: the U-Net learns shapes sooner.
 ALONE = 0.3
 # Between which temperatures the least loss is looked for.
@@ -53,16 +58,6 @@ class TrainingConfig:
     decay: float = 0.02
     warming: int = 100
     seed: int = 0
-
-
-@dataclass
-class Progress:
-    """`step` steps of `epoch` are done, with `losses` so far; history : of epochs that are over."""
-
-    epoch: int = 0
-    step: int = 0
-    losses: list[float] = field(default_factory=list)
-    history: list[dict[str, float]] = field(default_factory=list)
 
 
 def started(config: ShapeNetworkConfig, network: Network, seed: int) -> ShapeNetwork:
@@ -105,7 +100,7 @@ class Training:
         self.jitter = jitter
         self.progress = Progress()
         if (folder / CHECKPOINT).exists():
-            self._restore()
+            self.progress = restore_checkpoint(folder, self._fixed(), self.network, self.optimizer)
 
     def run(
         self,
@@ -190,41 +185,7 @@ class Training:
 
     def save(self) -> None:
         """Write checkpoint and history."""
-        with atomic_path(self.folder / CHECKPOINT) as partial:
-            torch.save(
-                {
-                    "fixed": self._fixed(),
-                    "network": self.network.state_dict(),
-                    "optimizer": self.optimizer.state_dict(),
-                    "progress": asdict(self.progress),
-                },
-                partial,
-            )
-        lines = json.dumps(self.progress.history, indent=1) + "\n"
-        write_bytes(self.folder / HISTORY, lines.encode())
-
-    def _restore(self) -> None:
-        path = self.folder / CHECKPOINT
-        try:
-            found = torch.load(path, weights_only=True)
-            kept, wanted = found["fixed"], self._fixed()
-            if kept == wanted:
-                self.network.load_state_dict(found["network"])
-                self.optimizer.load_state_dict(found["optimizer"])
-                self.progress = Progress(**found["progress"])
-                return
-        except Exception as error:  # torch and pickle raise whatever they like
-            raise BrrpError(
-                "The checkpoint cannot be read", where=path, found=error, fix="delete it"
-            ) from error
-        names = [name for name in wanted if kept.get(name) != wanted[name]]
-        raise BrrpError(
-            "The folder holds another training",
-            where=path,
-            expected=", ".join(f"{name} = {wanted[name]}" for name in names),
-            found=", ".join(f"{name} = {kept.get(name)}" for name in names),
-            fix="choose another folder with -o, or the options that it was begun with",
-        )
+        save_checkpoint(self.folder, self._fixed(), self.network, self.optimizer, self.progress)
 
     def _fixed(self) -> dict[str, Any]:
         """What a training cannot change on its way: all but when it ends and how it cools."""

@@ -8,9 +8,8 @@ goes on as if it had not been (on the CPU to the last bit; CUDA adds in no fixed
 from __future__ import annotations
 
 import json
-import math
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from time import monotonic
 from typing import Any
@@ -21,16 +20,20 @@ from numpy.typing import NDArray
 from torch import Tensor
 from torch.nn.functional import binary_cross_entropy_with_logits
 
-from brrp_cli.errors import BrrpError
-from brrp_cli.files import atomic_path, write_bytes
 from brrp_cli.methods.pointsdf.network import NetworkConfig, PointSDF
 from brrp_cli.methods.pointsdf.weights import save_weights
 from brrp_cli.seeds import child_rng, child_seed
+from training.checkpoint import (
+    CHECKPOINT,
+    Progress,
+    cooled,
+    restore_checkpoint,
+    save_checkpoint,
+)
 from training.examples import Examples
 
 LEVEL = 0.3
 SETTLING = 32  # batches
-CHECKPOINT, HISTORY = "checkpoint.pt", "history.json"
 
 
 @dataclass(frozen=True)
@@ -63,19 +66,6 @@ def narrowed(config: NetworkConfig, width: float) -> NetworkConfig:
     return replace(config, features=features, hidden=fewer(config.hidden))
 
 
-@dataclass
-class Progress:
-    """Where a training is: `step` steps of `epoch` are done, with `losses` so far.
-
-    history : a record for each epoch that is over
-    """
-
-    epoch: int = 0
-    step: int = 0
-    losses: list[float] = field(default_factory=list)
-    history: list[dict[str, float]] = field(default_factory=list)
-
-
 class Training:
     """A training in a folder: checkpoint.pt, history.json, and `weights` of its best epoch.
 
@@ -99,7 +89,9 @@ class Training:
         self.optimizer = torch.optim.Adam(self.network.parameters(), config.learning_rate)
         self.progress = Progress()
         if (folder / CHECKPOINT).exists():
-            self._restore()
+            self.progress = restore_checkpoint(
+                folder, self._fixed(), self.network, self.optimizer, self.device
+            )
 
     def run(
         self,
@@ -150,41 +142,7 @@ class Training:
 
     def save(self) -> None:
         """Write checkpoint and history."""
-        with atomic_path(self.folder / CHECKPOINT) as partial:
-            torch.save(
-                {
-                    "fixed": self._fixed(),
-                    "network": self.network.state_dict(),
-                    "optimizer": self.optimizer.state_dict(),
-                    "progress": asdict(self.progress),
-                },
-                partial,
-            )
-        lines = json.dumps(self.progress.history, indent=1) + "\n"
-        write_bytes(self.folder / HISTORY, lines.encode())
-
-    def _restore(self) -> None:
-        path = self.folder / CHECKPOINT
-        try:
-            found = torch.load(path, map_location=self.device, weights_only=True)
-            if found["fixed"] == self._fixed():
-                self.network.load_state_dict(found["network"])
-                self.optimizer.load_state_dict(found["optimizer"])
-                self.progress = Progress(**found["progress"])
-                return
-        except Exception as error:  # torch and pickle raise whatever they like
-            raise BrrpError(
-                "The checkpoint cannot be read", where=path, found=error, fix="delete it"
-            ) from error
-        wanted, kept = self._fixed(), found["fixed"]
-        names = [k for k in wanted if kept.get(k) != wanted[k]]
-        raise BrrpError(
-            "The folder holds another training",
-            where=path,
-            expected=", ".join(f"{k} = {wanted[k]}" for k in names),
-            found=", ".join(f"{k} = {kept.get(k)}" for k in names),
-            fix="choose another folder with -o, or the options that it was begun with",
-        )
+        save_checkpoint(self.folder, self._fixed(), self.network, self.optimizer, self.progress)
 
     def _fixed(self) -> dict[str, Any]:
         """What a training cannot change on its way: all but when it ends and how it cools."""
@@ -271,13 +229,6 @@ class Training:
             self.config.noise / self.network.config.scale,
             child_rng(self.config.seed, purpose, self.progress.epoch, step),
         )
-
-
-def cooled(epoch: float, epochs: int, cooling: int) -> float:
-    """The share of the learning rate after `epoch` epochs: 1, then half a cosine down to 0 over the
-    last `cooling` of `epochs`."""
-    past = epoch - (epochs - cooling)
-    return 1.0 if past <= 0 else (1 + math.cos(math.pi * past / cooling)) / 2
 
 
 def draw_batch(

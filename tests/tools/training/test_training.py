@@ -4,12 +4,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from eight_objects import NETWORK
+from training.checkpoint import CHECKPOINT, HISTORY, cooled
 from training.pointsdf import (
-    CHECKPOINT,
-    HISTORY,
     Training,
     TrainingConfig,
-    cooled,
     draw_batch,
     evaluate,
     narrowed,
