@@ -7,7 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from fit_likelihood import Mask, as_json, fit, loss, placed, ratios, read, with_likelihood
+from fit_likelihood import fit, loss, ratios, with_likelihood
+from likelihood.masks import Mask, as_json, placed, read
 
 from brrp_cli.config import LikelihoodConfig, preset
 from brrp_cli.registration.likelihood import PlacementEvidence, log_likelihood
