@@ -1,14 +1,15 @@
 """Train the completion that has learned shapes (brrp_cli/completion/shape_network.py).
 
-    python tools/train_completion.py house:. drawn:. ycb_scenes:. random:. composed:. -o train
+    python tools/train_completion.py house:. drawn:. ycb_scenes:. stereo:.:measured -o train
 
-SCENES:DATA_ROOT are scenes of `tools/make_scenes.py` without noise, the same as those of
-`tools/fit_completion.py`, whose docstring has the commands. Every view becomes a frame of one of
-several depth cameras, or of none, some with masks that lie beside their objects
-(training/completion_examples.py). First every object of every view becomes an example, a volume and
-labelled points with their lengths, in OUTPUT/examples. Then the network is trained, which begins as
-the network of lengths that comes with the package. The same command goes on where it was stopped or
-killed; more --epochs lengthen a training that is over.
+SCENES:DATA_ROOT are scenes of `tools/make_scenes.py` without noise (docs/methods.md). Every view
+becomes a frame of one of several depth cameras, or of none, some with masks that lie beside their
+objects (training/completion_examples.py). The depth of SCENES:DATA_ROOT:measured is a camera's
+already (`--sensor stereo`) and is taken as it is. First every object of every view becomes an
+example, a volume and labelled points with their lengths, in OUTPUT/examples. Then the network is
+trained, which begins as the network of lengths that comes with the package, or with `--begin`, as
+an earlier network of shapes. The same command goes on where it was stopped or killed; more --epochs
+lengthen a training that is over.
 
 Some shapes, by name, are kept to validate. OUTPUT/shapes.safetensors has the weights of the epoch
 with the least loss on them, with a temperature that was fitted to them; copied to
@@ -35,7 +36,11 @@ from training.interrupted import signalled
 from brrp_cli.completion.learned import NAME, save_shapes
 from brrp_cli.completion.network import fitted
 from brrp_cli.errors import BrrpError
+from brrp_cli.files import sha256_file
 from brrp_cli.ground_truth.scenes import find_scenes
+
+MEASURED = "measured"
+SETS = f"SCENES:DATA_ROOT or SCENES:DATA_ROOT:{MEASURED}"
 
 
 @click.command()
@@ -56,6 +61,11 @@ from brrp_cli.ground_truth.scenes import find_scenes
     type=click.FloatRange(0, 0.5),
     help="Share of the shapes.",
 )
+@click.option(
+    "--begin",
+    type=click.Path(path_type=Path, exists=True, dir_okay=False),
+    help="As the network of this shapes.safetensors, in place of the network of lengths.",
+)
 @click.option("--seed", default=0, show_default=True)
 @click.option("--minutes", type=click.FloatRange(0), help="Stop, to go on later, after so long.")
 @click.option("--examples-only", is_flag=True, help="Make the examples and stop.")
@@ -69,13 +79,14 @@ def main(
     points: int,
     rate: float,
     validation: float,
+    begin: Path | None,
     seed: int,
     minutes: float | None,
     examples_only: bool,
 ) -> None:
-    """Train on SETS, each SCENES:DATA_ROOT, or on the examples that are in OUTPUT already."""
-    from training.completion import Training, TrainingConfig, scores
-    from training.completion_examples import held_names, make_all, read_examples
+    """Train on SETS, SCENES:DATA_ROOT[:measured], or on the examples that are in OUTPUT already."""
+    from training.completion import Training, TrainingConfig, resumed, scores, started
+    from training.completion_examples import Wanted, held_names, make_all, read_examples
 
     from brrp_cli.completion.shape_network import ShapeNetworkConfig
 
@@ -86,9 +97,15 @@ def main(
         folder = output / "examples"
         wanted = []
         for each in sets:
-            scenes, _, root = each.partition(":")
-            found = find_scenes(Path(scenes))
-            wanted += [(scene, view, Path(root)) for scene in found for view in range(views)]
+            scenes, _, rest = each.partition(":")
+            root, _, how = rest.partition(":")
+            if how not in ("", MEASURED):
+                raise BrrpError("A set is not understood", where=each, expected=SETS, found=how)
+            wanted += [
+                Wanted(scene, view, Path(root), how == MEASURED)
+                for scene in find_scenes(Path(scenes))
+                for view in range(views)
+            ]
         for _ in tqdm(make_all(wanted, seed, folder), desc="examples", total=len(wanted)):
             pass
         paths = sorted(folder.glob("*/*.npz"))
@@ -109,8 +126,11 @@ def main(
                 fix="make more scenes",
             )
         del every
-        config = TrainingConfig(epochs, cooling, batch, points, rate, seed=seed)
-        training = Training(ShapeNetworkConfig(), config, output, len(train))
+        config = TrainingConfig(
+            epochs=epochs, cooling=cooling, batch=batch, rate=rate, seed=seed, points=points
+        )
+        network = started(ShapeNetworkConfig(), fitted(), seed) if begin is None else resumed(begin)
+        training = Training(network, config, output, len(train))
         done, steps = training.progress, len(training.batches(len(train), 0))
         if done.epoch or done.step:
             click.echo(f"Going on after epoch {done.epoch}, step {done.step}", err=True)
@@ -148,6 +168,7 @@ def main(
         "temperature": float(best.temperature),
         "best": record,
         "lengths": lengths,
+        "begun": None if begin is None else sha256_file(begin),
     }
     save_shapes(best, about, output / NAME)
     click.echo(f"Network of lengths: {lengths}; of shapes: {record}")

@@ -139,7 +139,16 @@ def main(
             "truth": truth,
             "meshes": sorted(Counter(train.names)),
         }
-        config = TrainingConfig(epochs, batch, queries, noise, rate, precision, seed, cooling)
+        config = TrainingConfig(
+            epochs=epochs,
+            cooling=cooling,
+            batch=batch,
+            rate=rate,
+            seed=seed,
+            queries=queries,
+            noise=noise,
+            precision=precision,
+        )
         weights = output / f"{output.name}.safetensors"
         training = Training(network, config, output, weights, about, pick_device(device))
         done = training.progress

@@ -68,7 +68,7 @@ class VolumeConfig:
     """
 
     side: int = 40
-    depth: float = 0.8
+    depth: float = 1.0
     margin: float = 0.1
     hidden: float = 0.3
     below: float = 0.05

@@ -84,7 +84,7 @@ def _train(place: Place, steps: int) -> None:
 
     from brrp_cli.methods.pointsdf.weights import save_weights
 
-    config = TrainingConfig(batch=8, queries=512, noise=0.0, learning_rate=RATE)
+    config = TrainingConfig(batch=8, queries=512, noise=0.0, rate=RATE)
     about = {"name": "eight"}
     training = Training(NETWORK, config, place.folder, place.weights, about)
     eight = np.arange(8)

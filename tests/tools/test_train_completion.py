@@ -2,18 +2,23 @@
 
 import json
 import shutil
+from importlib.resources import files
 
 import numpy as np
 import pytest
 import torch
 from click.testing import CliRunner
+from safetensors import safe_open
 from tiny_scenes import write_meshes, write_scene
 from train_completion import main
+from training import completion_examples
 from training.completion import ShapeNetworkConfig, draw_batch, scores, started
-from training.completion_examples import held_names, read_examples
+from training.completion_examples import Wanted, held_names, make_view, read_examples
 
 from brrp_cli.completion.learned import load_shapes
 from brrp_cli.completion.network import fitted
+from brrp_cli.files import sha256_file
+from brrp_cli.ground_truth.scenes import find_scenes
 
 # With this seed the small images are seen by a camera that does not lose what they show, and the
 # ball is kept to validate.
@@ -102,6 +107,37 @@ def test_shapes_are_kept_by_name():
     kept = held_names(names + names, 0.1, 0)
     assert 20 < len(kept) < 60 and kept < set(names)
     assert held_names(names[:50], 0.1, 0) == kept & set(names[:50])
+
+
+def test_goes_on_from_the_weights_of_another_training(place, tmp_path):
+    """After no step at all it says what they say."""
+    weights = files("brrp_cli.completion") / "shapes.safetensors"
+    shutil.copytree(place / "made", tmp_path / "more")
+    options = ["--begin", weights, "--validation", 0.5, *SMALL, "--rate", 0.0]
+    assert run("-o", tmp_path / "more", "--epochs", 1, *options).exit_code == 0
+    before, after = load_shapes(weights), load_shapes(tmp_path / "more" / "shapes.safetensors")
+    for name, tensor in before.state_dict().items():
+        if name != "temperature":
+            torch.testing.assert_close(after.state_dict()[name], tensor)
+    with safe_open(tmp_path / "more" / "shapes.safetensors", framework="pt") as file:
+        assert json.loads(file.metadata()["training"])["begun"] == sha256_file(weights)
+
+
+def test_a_set_that_is_not_understood_is_named(tmp_path):
+    result = run("scenes:.:masured", "-o", tmp_path)
+    assert result.exit_code == 1 and "masured" in result.output and "measured" in result.output
+
+
+def test_measured_depth_is_taken_as_it_is(place, tmp_path, monkeypatch):
+    monkeypatch.setattr(completion_examples, "SENSORS", {"kinect-azure": 1.0})
+    scenes = find_scenes(place / "scenes")
+    seen = {}
+    for measured in (True, False):
+        wanted = Wanted(scenes[1], 0, place, measured)
+        make_view(wanted, 1, tmp_path / f"{measured}.npz")
+        seen[measured] = read_examples([tmp_path / f"{measured}.npz"])
+    assert seen[True].names == seen[False].names == ("box",)
+    assert not np.array_equal(seen[True].volumes, seen[False].volumes)
 
 
 @pytest.mark.slow

@@ -1,17 +1,9 @@
-"""Training of the completion that has learned shapes (brrp_cli/completion/shape_network.py).
-
-As for PointSDF, all that is random in a step comes from the seed, the epoch and the step's number;
-a checkpoint holds everything else, so that what was interrupted goes on as if it had not been.
-"""
+"""Training of the completion that has learned shapes (brrp_cli/completion/shape_network.py)."""
 
 from __future__ import annotations
 
-import json
-from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from time import monotonic
-from typing import Any
 
 import numpy as np
 import torch
@@ -20,19 +12,14 @@ from numpy.typing import NDArray
 from torch import Tensor
 from torch.nn.functional import binary_cross_entropy_with_logits as cross_entropy
 
-from brrp_cli.completion.network import Network, fitted
+from brrp_cli.completion.learned import load_shapes
+from brrp_cli.completion.network import Network
 from brrp_cli.completion.point_features import WHOLE
 from brrp_cli.completion.shape_network import ShapeNetwork, ShapeNetworkConfig
 from brrp_cli.files import atomic_path
-from brrp_cli.seeds import child_rng, child_seed
-from training.checkpoint import (
-    CHECKPOINT,
-    Progress,
-    cooled,
-    restore_checkpoint,
-    save_checkpoint,
-)
+from brrp_cli.seeds import child_seed
 from training.completion_examples import Examples
+from training.epochs import EpochsConfig, EpochTraining
 
 BEST = "best.pt"
 # Of the loss of the volume's features alone: the U-Net learns shapes sooner.
@@ -42,22 +29,19 @@ TEMPERATURES = np.geomspace(0.5, 2.0, 57)
 
 
 @dataclass(frozen=True)
-class TrainingConfig:
+class TrainingConfig(EpochsConfig):
     """How to train (AdamW, binary cross-entropy).
 
-    batch : objects in a step; points : of each, drawn anew for each step
-    cooling : epochs at the end over which the learning rate falls to nothing, by half a cosine;
-        warming : steps at the start over which it rises
+    points : of each object, drawn anew for each step
     """
 
     epochs: int = 6
     cooling: int = 5
     batch: int = 8
-    points: int = 512
     rate: float = 2e-3
-    decay: float = 0.02
     warming: int = 100
-    seed: int = 0
+    points: int = 512
+    decay: float = 0.02
 
 
 def started(config: ShapeNetworkConfig, network: Network, seed: int) -> ShapeNetwork:
@@ -77,93 +61,38 @@ def started(config: ShapeNetworkConfig, network: Network, seed: int) -> ShapeNet
     return found
 
 
-class Training:
-    """A training in a folder: checkpoint.pt, history.json, and best.pt, the weights of the epoch
-    with the least loss on held-out shapes.
+def resumed(path: Path) -> ShapeNetwork:
+    """A network to train on, from a file that `tools/train_completion.py` wrote. Errors:
+    WeightsError."""
+    found = load_shapes(path).requires_grad_(True)
+    found.temperature.fill_(1.0)
+    return found
 
-    Errors: BrrpError if the folder holds a training with another configuration or a damaged one.
+
+class Training(EpochTraining[Examples]):
+    """A training whose best epoch, that with the least loss on held-out shapes, is in best.pt.
+
+    begun : what it begins as
     """
 
+    CRITERION = "nll"
+    config: TrainingConfig
+    network: ShapeNetwork
+
     def __init__(
-        self, network: ShapeNetworkConfig, config: TrainingConfig, folder: Path, objects: int
+        self, begun: ShapeNetwork, config: TrainingConfig, folder: Path, objects: int
     ) -> None:
-        self.config, self.folder, self.objects = config, folder, objects
         # Channels last: a third faster for several objects at once.
-        self.network = started(network, fitted(), config.seed).to(
-            memory_format=torch.channels_last_3d
-        )
-        self.optimizer = torch.optim.AdamW(
-            self.network.parameters(), config.rate, weight_decay=config.decay
-        )
-        jitter = torch.full((network.lengths,), JITTER)
-        jitter[-WHOLE:] = JITTER_WHOLE
-        self.jitter = jitter
-        self.progress = Progress()
-        if (folder / CHECKPOINT).exists():
-            self.progress = restore_checkpoint(folder, self._fixed(), self.network, self.optimizer)
+        network = begun.to(memory_format=torch.channels_last_3d)
+        optimizer = torch.optim.AdamW(network.parameters(), config.rate, weight_decay=config.decay)
+        fixed = {**asdict(begun.config), "objects": objects}
+        super().__init__(config, network, optimizer, folder, fixed)
+        self.jitter = torch.full((begun.config.lengths,), JITTER)
+        self.jitter[-WHOLE:] = JITTER_WHOLE
 
-    def run(
-        self,
-        train: Examples,
-        held: Examples,
-        *,
-        every: int = 100,
-        go_on: Callable[[], bool] = lambda: True,
-        stepped: Callable[[float], None] = lambda loss: None,
-        ended: Callable[[dict[str, float]], None] = lambda record: None,
-    ) -> bool:
-        """Train to the last epoch; False if `go_on` said to stop before it. Arguments as those of
-        PointSDF's training."""
-        state = self.progress
-        while state.epoch < self.config.epochs:
-            start = monotonic()
-            batches = self.batches(len(train), state.epoch)
-            for step in range(state.step, len(batches)):
-                if not go_on():
-                    self.save()
-                    return False
-                self._set_rate(step, len(batches))
-                loss = self.step(train, batches[step], step)
-                state.losses.append(loss)
-                state.step += 1
-                stepped(loss)
-                if state.step % every == 0:
-                    self.save()
-            record = {
-                "epoch": state.epoch + 1,
-                "train_loss": float(np.mean(state.losses)),
-                **scores(logits_of(self.network, held, self.config.batch), held),
-                "seconds": round(monotonic() - start, 1),
-            }
-            state.history.append(record)
-            state.epoch, state.step, state.losses = state.epoch + 1, 0, []
-            if min(state.history, key=lambda each: each["nll"]) is record:
-                with atomic_path(self.folder / BEST) as partial:
-                    torch.save(self.network.state_dict(), partial)
-            self.save()
-            ended(record)
-        return True
-
-    def best(self, held: Examples) -> ShapeNetwork:
-        """The network of the best epoch, its temperature fitted to held-out shapes."""
-        found = ShapeNetwork(self.network.config)
-        found.load_state_dict(torch.load(self.folder / BEST, weights_only=True))
-        found.temperature.fill_(1.0)
-        logits = logits_of(found, held, self.config.batch)
-        losses = [scores(logits / t, held)["nll"] for t in TEMPERATURES]
-        found.temperature.fill_(float(TEMPERATURES[int(np.argmin(losses))]))
-        return found.eval().requires_grad_(False)
-
-    def batches(self, count: int, epoch: int) -> list[NDArray[np.int64]]:
-        """All examples once, in an order of the epoch's own."""
-        order = child_rng(self.config.seed, "order", epoch).permutation(count)
-        return np.array_split(order, max(1, count // self.config.batch))
-
-    def step(self, train: Examples, rows: NDArray[np.int64], step: int) -> float:
-        """Step number `step` of this epoch, on these objects; gives its loss."""
-        rng = child_rng(self.config.seed, "step", self.progress.epoch, step)
+    def learn(self, train: Examples, rows: NDArray[np.int64], rng: np.random.Generator) -> float:
+        """Learn from these objects, and give the loss on them."""
         volumes, lengths, places, inside = draw_batch(train, rows, self.config.points, rng)
-        torch.manual_seed(child_seed(self.config.seed, "dropout", self.progress.epoch, step))
         network = self.network.train()
         self.optimizer.zero_grad()
         found = network.at(network.encode(volumes), places)
@@ -176,24 +105,24 @@ class Training:
         self.optimizer.step()
         return float(loss.detach())
 
-    def _set_rate(self, step: int, steps: int) -> None:
-        done = self.progress.epoch * steps + step
-        warm = min(1.0, (done + 1) / self.config.warming)
-        cool = cooled(done / steps, self.config.epochs, self.config.cooling)
-        for group in self.optimizer.param_groups:
-            group["lr"] = self.config.rate * warm * cool
+    def scores(self, held: Examples) -> dict[str, float]:
+        """As `scores`, of the network as it is."""
+        return scores(logits_of(self.network, held, self.config.batch), held)
 
-    def save(self) -> None:
-        """Write checkpoint and history."""
-        save_checkpoint(self.folder, self._fixed(), self.network, self.optimizer, self.progress)
+    def keep(self, record: dict[str, float]) -> None:
+        """Write best.pt."""
+        with atomic_path(self.folder / BEST) as partial:
+            torch.save(self.network.state_dict(), partial)
 
-    def _fixed(self) -> dict[str, Any]:
-        """What a training cannot change on its way: all but when it ends and how it cools."""
-        config = asdict(self.config)
-        config.pop("epochs")
-        config.pop("cooling")
-        found = {**config, **asdict(self.network.config), "objects": self.objects}
-        return dict(json.loads(json.dumps(found)))
+    def best(self, held: Examples) -> ShapeNetwork:
+        """The network of the best epoch, its temperature fitted to held-out shapes."""
+        found = ShapeNetwork(self.network.config)
+        found.load_state_dict(torch.load(self.folder / BEST, weights_only=True))
+        found.temperature.fill_(1.0)
+        logits = logits_of(found, held, self.config.batch)
+        losses = [scores(logits / t, held)["nll"] for t in TEMPERATURES]
+        found.temperature.fill_(float(TEMPERATURES[int(np.argmin(losses))]))
+        return found.eval().requires_grad_(False)
 
 
 def draw_batch(

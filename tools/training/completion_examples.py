@@ -73,22 +73,39 @@ class Examples:
         )
 
 
-def make_view(scene: Scene, view: int, data_root: Path, seed: int, path: Path) -> None:
-    """Write the examples of a view of a scene without noise, whole or not at all."""
-    rng = child_rng(seed, scene.folder.parent.name, scene.name, view)
-    write_bytes(path, _as_bytes(view_examples(scene, scene.view(view), data_root, seed, rng)))
+@dataclass(frozen=True)
+class Wanted:
+    """A view of a scene, where its meshes are, and whether its depth is a camera's already."""
+
+    scene: Scene
+    view: int
+    data_root: Path
+    measured: bool = False
+
+    @property
+    def name(self) -> str:
+        """The examples' file, in the folder of all."""
+        return f"{self.scene.folder.parent.name}/{self.scene.name}_{self.view}.npz"
+
+
+def make_view(wanted: Wanted, seed: int, path: Path) -> None:
+    """Write the examples of a view, whole or not at all."""
+    scene = wanted.scene
+    rng = child_rng(seed, scene.folder.parent.name, scene.name, wanted.view)
+    frame = scene.view(wanted.view)
+    frame = _worse_masks(frame if wanted.measured else through_a_sensor(frame, rng), rng)
+    write_bytes(path, _as_bytes(view_examples(scene, frame, wanted.data_root, seed, rng)))
 
 
 def view_examples(
-    scene: Scene, clean: Frame, data_root: Path, seed: int, rng: np.random.Generator
+    scene: Scene, frame: Frame, data_root: Path, seed: int, rng: np.random.Generator
 ) -> list[
     tuple[NDArray[np.int8], NDArray[np.float16], NDArray[np.float16], NDArray[np.bool_], str]
 ]:
-    """Volume, lengths, places, inside and name of each object that can be used."""
+    """Volume, lengths, places, inside and name of each object of `frame` that can be used."""
     config = preset("default")
     hypotheses = config.hypotheses
     assert hypotheses is not None
-    frame = _worse_masks(through_a_sensor(clean, rng), rng)
     T_world_cam = frame.T_world_cam
     assert T_world_cam is not None
     clouds = {i: frame.object_points(i) for i in frame.object_ids}
@@ -195,14 +212,14 @@ def read_examples(paths: Sequence[Path]) -> Examples:
     )
 
 
-def make_all(wanted: Sequence[tuple[Scene, int, Path]], seed: int, folder: Path) -> Iterator[Path]:
-    """Write what is missing of the examples of (scene, view, data root) into `folder`, all first
-    views first; yields each one's file."""
-    for scene, view, data_root in sorted(wanted, key=lambda each: (each[1], each[0].name)):
-        path = folder / scene.folder.parent.name / f"{scene.name}_{view}.npz"
+def make_all(every: Sequence[Wanted], seed: int, folder: Path) -> Iterator[Path]:
+    """Write what is missing of the examples of these views into `folder`, all first views first;
+    yields each one's file."""
+    for wanted in sorted(every, key=lambda each: (each.view, each.scene.name)):
+        path = folder / wanted.name
         if not path.exists():
             path.parent.mkdir(parents=True, exist_ok=True)
-            make_view(scene, view, data_root, seed, path)
+            make_view(wanted, seed, path)
         yield path
 
 

@@ -1,17 +1,10 @@
-"""Training of PointSDF: epochs over examples, checkpoints, and the same losses after a kill.
-
-All that is random in a step comes from the seed, the epoch and the step's number alone. A
-checkpoint holds everything else that a step depends on, so that a training that was interrupted
-goes on as if it had not been (on the CPU to the last bit; CUDA adds in no fixed order).
-"""
+"""Training of PointSDF."""
 
 from __future__ import annotations
 
-import json
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from time import monotonic
 from typing import Any
 
 import numpy as np
@@ -23,13 +16,7 @@ from torch.nn.functional import binary_cross_entropy_with_logits
 from brrp_cli.methods.pointsdf.network import NetworkConfig, PointSDF
 from brrp_cli.methods.pointsdf.weights import save_weights
 from brrp_cli.seeds import child_rng, child_seed
-from training.checkpoint import (
-    CHECKPOINT,
-    Progress,
-    cooled,
-    restore_checkpoint,
-    save_checkpoint,
-)
+from training.epochs import EpochsConfig, EpochTraining
 from training.examples import Examples
 
 LEVEL = 0.3
@@ -37,23 +24,21 @@ SETTLING = 32  # batches
 
 
 @dataclass(frozen=True)
-class TrainingConfig:
+class TrainingConfig(EpochsConfig):
     """How to train (Adam, binary cross-entropy).
 
-    batch : objects in a step; queries : of each, drawn anew for each step
+    queries : of each object, drawn anew for each step
     noise : metres, standard deviation of each coordinate of a cloud's points
     precision : "float32" or "bfloat16", of the products; weights are float32 either way
-    cooling : epochs at the end over which the learning rate falls to nothing, by half a cosine
     """
 
     epochs: int = 50
+    cooling: int = 0
     batch: int = 16
+    rate: float = 1e-3
     queries: int = 512
     noise: float = 0.002
-    learning_rate: float = 1e-3
     precision: str = "float32"
-    seed: int = 0
-    cooling: int = 0
 
 
 def narrowed(config: NetworkConfig, width: float) -> NetworkConfig:
@@ -66,12 +51,15 @@ def narrowed(config: NetworkConfig, width: float) -> NetworkConfig:
     return replace(config, features=features, hidden=fewer(config.hidden))
 
 
-class Training:
-    """A training in a folder: checkpoint.pt, history.json, and `weights` of its best epoch.
+class Training(EpochTraining[Examples]):
+    """A training that writes its best epoch to the file `weights`.
 
     about : what the weights' file is to say of the examples, plain JSON; device : torch's name
-    Errors: BrrpError if the folder holds a training with another configuration or a damaged one.
     """
+
+    CRITERION = "validation_loss"
+    config: TrainingConfig
+    network: PointSDF
 
     def __init__(
         self,
@@ -83,88 +71,23 @@ class Training:
         device: str = "cpu",
     ) -> None:
         torch.manual_seed(child_seed(config.seed, "network"))
-        self.config, self.folder, self.weights, self.about = config, folder, weights, about
-        self.device = device
-        self.network = PointSDF(network).to(device)
-        self.optimizer = torch.optim.Adam(self.network.parameters(), config.learning_rate)
-        self.progress = Progress()
-        if (folder / CHECKPOINT).exists():
-            self.progress = restore_checkpoint(
-                folder, self._fixed(), self.network, self.optimizer, self.device
-            )
+        self.weights, self.about = weights, about
+        begun = PointSDF(network).to(device)
+        fixed = {
+            **{f"network {k}": v for k, v in asdict(network).items()},
+            **{f"examples {k}": v for k, v in about.items()},
+        }
+        optimizer = torch.optim.Adam(begun.parameters(), config.rate)
+        super().__init__(config, begun, optimizer, folder, fixed, device)
 
-    def run(
-        self,
-        train: Examples,
-        validation: Examples,
-        *,
-        every: int = 200,
-        go_on: Callable[[], bool] = lambda: True,
-        stepped: Callable[[float], None] = lambda loss: None,
-        ended: Callable[[dict[str, float]], None] = lambda record: None,
-    ) -> bool:
-        """Train to the last epoch; False if `go_on` said to stop before it.
+    def keep(self, record: dict[str, float]) -> None:
+        """Write the weights."""
+        about = {**self.about, "config": asdict(self.config), **record}
+        save_weights(self.network, about, self.weights, half=True)
 
-        every : steps between checkpoints, beside the one after each epoch; stepped : told the loss
-        of each step; ended : told the record of each epoch
-        """
-        state = self.progress
-        while state.epoch < self.config.epochs:
-            start = monotonic()
-            batches = self.batches(len(train), state.epoch)
-            for step in range(state.step, len(batches)):
-                if not go_on():
-                    self.save()
-                    return False
-                self.set_rate(state.epoch + step / len(batches))
-                loss = self.step(train, batches[step], step)
-                state.losses.append(loss)
-                state.step += 1
-                stepped(loss)
-                if state.step % every == 0:
-                    self.save()
-            self.settle(train, batches[:SETTLING])
-            record = {
-                "epoch": state.epoch + 1,
-                "train_loss": float(np.mean(state.losses)),
-                **evaluate(self.network, validation, self.config.batch, self.device),
-                "seconds": round(monotonic() - start, 1),
-            }
-            state.history.append(record)
-            state.epoch, state.step, state.losses = state.epoch + 1, 0, []
-            best = min(state.history, key=lambda each: each["validation_loss"])
-            if best is record:
-                about = {**self.about, "config": asdict(self.config), **record}
-                save_weights(self.network, about, self.weights, half=True)
-            self.save()
-            ended(record)
-        return True
-
-    def save(self) -> None:
-        """Write checkpoint and history."""
-        save_checkpoint(self.folder, self._fixed(), self.network, self.optimizer, self.progress)
-
-    def _fixed(self) -> dict[str, Any]:
-        """What a training cannot change on its way: all but when it ends and how it cools."""
-        config = asdict(self.config)
-        config.pop("epochs")
-        config.pop("cooling")
-        return json.loads(
-            json.dumps(
-                {
-                    **{f"training {k}": v for k, v in config.items()},
-                    **{f"network {k}": v for k, v in asdict(self.network.config).items()},
-                    **{f"examples {k}": v for k, v in self.about.items()},
-                }
-            )
-        )
-
-    def set_rate(self, epoch: float) -> None:
-        """The learning rate after `epoch` epochs, a fraction too, of this training."""
-        for group in self.optimizer.param_groups:
-            group["lr"] = self.config.learning_rate * cooled(
-                epoch, self.config.epochs, self.config.cooling
-            )
+    def scores(self, held: Examples) -> dict[str, float]:
+        """As `evaluate`, of the network as it is."""
+        return evaluate(self.network, held, self.config.batch, self.device)
 
     def settle(self, train: Examples, batches: list[NDArray[np.int64]]) -> None:
         """Batch normalisation's statistics anew: the mean of those by which these batches are
@@ -187,8 +110,8 @@ class Training:
         self.network.train()
         torch.manual_seed(child_seed(self.config.seed, "settle", self.progress.epoch))
         with torch.no_grad():
-            for number, rows in enumerate(batches):
-                clouds, queries, _ = self._draw(train, rows, "settle", number)
+            for number, rows in enumerate(batches[:SETTLING]):
+                clouds, queries, _ = self._draw(train, rows, self.rng("settle", number))
                 self.network(clouds.to(self.device), queries.to(self.device))
         for hook in hooks:
             hook.remove()
@@ -199,16 +122,9 @@ class Training:
             layer.running_mean.copy_(torch.stack(means).mean(dim=0))
             layer.running_var.copy_(torch.stack(variances).mean(dim=0))
 
-    def batches(self, count: int, epoch: int) -> list[NDArray[np.int64]]:
-        """All examples once, in an order of the epoch's own, as evenly as may be: no batch is
-        smaller than it should be, since batch normalisation needs two examples."""
-        order = child_rng(self.config.seed, "order", epoch).permutation(count)
-        return np.array_split(order, max(1, count // self.config.batch))
-
-    def step(self, train: Examples, rows: NDArray[np.int64], step: int) -> float:
-        """Step number `step` of this epoch, on these rows; gives its loss."""
-        clouds, queries, labels = self._draw(train, rows, "step", step)
-        torch.manual_seed(child_seed(self.config.seed, "dropout", self.progress.epoch, step))
+    def learn(self, train: Examples, rows: NDArray[np.int64], rng: np.random.Generator) -> float:
+        """Learn from these rows, and give the loss on them."""
+        clouds, queries, labels = self._draw(train, rows, rng)
         self.network.train()
         self.optimizer.zero_grad()
         half = self.config.precision == "bfloat16"
@@ -220,15 +136,10 @@ class Training:
         return float(loss.detach())
 
     def _draw(
-        self, train: Examples, rows: NDArray[np.int64], purpose: str, step: int
+        self, train: Examples, rows: NDArray[np.int64], rng: np.random.Generator
     ) -> tuple[Tensor, Tensor, Tensor]:
-        return draw_batch(
-            train,
-            rows,
-            self.config.queries,
-            self.config.noise / self.network.config.scale,
-            child_rng(self.config.seed, purpose, self.progress.epoch, step),
-        )
+        noise = self.config.noise / self.network.config.scale
+        return draw_batch(train, rows, self.config.queries, noise, rng)
 
 
 def draw_batch(
