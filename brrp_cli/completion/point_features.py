@@ -136,7 +136,7 @@ def _behind(
     points: Array, pixel: NDArray[np.int64], visible: NDArray[np.bool_], part: VisiblePart
 ) -> Array:
     """How far (n,) points (n, 3) lie behind the measured depth, metres; 0 where there is none."""
-    measured = part.frame.points[..., 2].ravel()[pixel]
+    measured = part.frame.depth.ravel()[pixel]
     behind = np.where(visible, points[:, 2] - measured, 0.0)
     return np.clip(np.nan_to_num(behind), -part.config.far, part.config.far)
 
