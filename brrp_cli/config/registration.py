@@ -116,7 +116,8 @@ class SearchConfig:
     Initial poses are `matchings` feature matchings and every resting pose turned `turns` times. The
     best `coarse` of them are refined `coarse_steps` steps with `coarse_points` observed points,
     which reach the surface from `coarse_distance`; the best `middle` of those, and then the best
-    `fine`, are refined again, each with more points. A stored object has its stored size. That it
+    `fine`, are refined again, each with more points, without those within `same_turn` radians and
+    `same_shift` metres of a better one. A stored object has its stored size. That it
     is something of the kind, of another size, is a hypothesis of its own, with a size that is
     refined with the pose: the best `rescaled` placements begin it at `sizes` times the true size,
     observed points pull from `size_distance` metres, and sizes whose logarithm is within
@@ -151,6 +152,8 @@ class SearchConfig:
     fine_distance: float = 0.01
     fine_points: int = 1000
     fine_steps: int = 10
+    same_turn: float = 0.02
+    same_shift: float = 0.001
     seen_points: int = 150
     sizes: tuple[float, ...] = (0.85, 1.18)
     rescaled: int = 2

@@ -20,7 +20,7 @@ RAYS = 3
 OFF = 0.9
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class StoredShape:
     """A closed, outward mesh in the unit and frame of the field that goes with it.
 
