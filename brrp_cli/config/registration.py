@@ -89,7 +89,8 @@ class TurnConfig:
     under which the mean distance of `surface_points` of its surface from itself is less than
     `itself`, metres. The `count` best of them by `coarse_points` observed points, first those that
     are `apart` radians from all better ones, are refined, and the best `judged` held against
-    `points` observed ones; distances beyond `far` metres count as that. One takes the place of the
+    `points` observed ones, without those whose mean distance on the coarse field is `worse`, metres,
+    than the best one's; distances beyond `far` metres count as that. One takes the place of the
     first if it is better by `gain` standard errors. Those that are worse by no more than
     `undecided` standard errors, and in alignment score by no more than `alike`, are as probable.
     """
@@ -100,6 +101,7 @@ class TurnConfig:
     itself: float = 0.003
     count: int = 16
     judged: int = 8
+    worse: float = 0.0005
     apart: float = 0.25
     coarse_points: int = 300
     points: int = 2000

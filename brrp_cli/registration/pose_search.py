@@ -57,7 +57,8 @@ def search(
     seed: int,
     best: float = -np.inf,
 ) -> list[Hypothesis]:
-    """The best placements of one model that differ in shape, best first, `config.kept` at most.
+    """The best placements of one model that differ in shape, best first, `config.kept` at most; of
+    one that cannot win, the best.
 
     best : alignment score that another model has reached
     """
@@ -81,7 +82,7 @@ def search(
     ):
         T, reached = _best(T, model, verifier, config, count)
         if reached < least:
-            return _distinct(_judged(T[: config.fine], model, verifier, config), config)
+            return _judged(T[:1], model, verifier, config)
         T = _refined(_different(T, config), model, verifier, points, distance, steps)
     found = _judged(T, model, verifier, config)
     found = by_colour(found, verifier, config)

@@ -61,7 +61,8 @@ def turned(placed: Hypothesis, verifier: Verifier, patch: float, config: SearchC
     )
     T = np.asarray(np.linalg.inv(refined), dtype=np.float64)
     near = np.minimum(_distances(T, placed, points[: config.fine_points]), turn.far).mean(axis=1)
-    T = T[np.argsort(near, kind="stable")[: turn.judged]]
+    near_enough = np.argsort(near, kind="stable")[: turn.judged]
+    T = T[near_enough[near[near_enough] <= near.min() + turn.worse]]
     T = np.concatenate([placed.T_cam_model[None], T])
     T = T[_as_much_explained(T, placed, verifier, config)]
     exact = np.minimum(_distances(T, placed, points, exact=True), turn.far)
