@@ -14,6 +14,7 @@ from brrp_cli.completion.network import fitted
 from brrp_cli.completion.point_features import point_features
 from brrp_cli.completion.visible_part import VisiblePart
 from brrp_cli.config import MeanConfig
+from brrp_cli.frames.dilate import dilated
 from brrp_cli.frames.frame import BACKGROUND, Frame
 from brrp_cli.frames.projection import at_pixels, depth_behind
 from brrp_cli.observation.support_plane import Plane
@@ -128,7 +129,7 @@ def empty_space(
     empty = np.nan_to_num(behind, nan=-np.inf) > config.carve_depth
     if plane is not None:
         empty |= plane.signed_distance(points) < -config.carve_plane
-    own = binary_dilation(frame.segmap == object_id, iterations=config.carve_pixels)
+    own = dilated(frame.segmap == object_id, config.carve_pixels)
     background = np.where((frame.segmap == BACKGROUND) & ~own, 1, 0)
     close = np.nan_to_num(behind, nan=-np.inf) > -config.carve_behind
     return empty | (close & (at_pixels(points, background, frame) == 1))

@@ -83,7 +83,7 @@ def search(
         T, reached = _best(T, model, verifier, config, count)
         if reached < least:
             return _judged(T[:1], model, verifier, config)
-        T = _refined(_different(T, config), model, verifier, points, distance, steps)
+        T = _refined(different(T, config), model, verifier, points, distance, steps)
     found = _judged(T, model, verifier, config)
     found = by_colour(found, verifier, config)
     if found[0].alignment_score < config.settled:
@@ -133,7 +133,7 @@ def by_colour(
         config.fine_distance,
         config.middle_steps,
     )
-    T = _different(T, config)
+    T = different(T, config)
     alike = [
         each
         for each in [best, *_judged(T, model, verifier, config)]
@@ -158,7 +158,7 @@ def _rotation(placed: Hypothesis) -> Rotation:
     return Rotation.from_matrix(placed.T_cam_model[:3, :3] / placed.scale)
 
 
-def _different(T_cam_model: Array, config: SearchConfig) -> Array:
+def different(T_cam_model: Array, config: SearchConfig) -> Array:
     """Placements (B, 4, 4), best first, of one size, without those that are all but a better one:
     more steps would bring both to the same place."""
     R, t = T_cam_model[:, :3, :3].reshape(-1, 9), T_cam_model[:, :3, 3]
