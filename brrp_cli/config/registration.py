@@ -89,8 +89,8 @@ class TurnConfig:
     under which the mean distance of `surface_points` of its surface from itself is less than
     `itself`, metres. The `count` best of them by `coarse_points` observed points, first those that
     are `apart` radians from all better ones, are refined, and the best `judged` held against
-    `points` observed ones, without those whose mean distance on the coarse field is `worse`, metres,
-    than the best one's; distances beyond `far` metres count as that. One takes the place of the
+    `points` observed ones, without those whose mean distance on the coarse field is longer than the
+    best one's by `worse` metres; distances beyond `far` metres count as that. One takes the place of the
     first if it is better by `gain` standard errors. Those that are worse by no more than
     `undecided` standard errors, and in alignment score by no more than `alike`, are as probable.
     """
@@ -127,7 +127,9 @@ class SearchConfig:
     size_cost + size_spread_cost * ln(size)^2. No other size is tried where the score reaches
     `settled`, and nothing is refined further where none of the placements reaches `hopeless` or all
     stay `beaten` behind another model's. Of placements whose surfaces lie within `distinct` metres
-    the best is kept, `kept` in all. rotations : evenly spread, which retrieval tries too.
+    the best is kept, `kept` in all. An object is not placed at all where another one, with a score
+    of `explained`, explains what is seen, and P(c|R) is less than a share `unlikely` of that one's.
+    rotations : evenly spread, which retrieval tries too.
     """
 
     turns: int = 24
@@ -169,6 +171,8 @@ class SearchConfig:
     settled: float = 0.9
     distinct: float = 0.0015
     kept: int = 6
+    explained: float = 0.85
+    unlikely: float = share(0.05)
     alignment_score: VerificationConfig = field(default_factory=VerificationConfig)
     colour: ColourConfig = field(default_factory=ColourConfig)
     about_itself: TurnConfig = field(default_factory=TurnConfig)
