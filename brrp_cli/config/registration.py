@@ -90,8 +90,8 @@ class TurnConfig:
     `itself`, metres. The `count` best of them by `coarse_points` observed points, first those that
     are `apart` radians from all better ones, are refined, and the best `judged` held against
     `points` observed ones, without those whose mean distance on the coarse field is longer than the
-    best one's by `worse` metres; distances beyond `far` metres count as that. One takes the place of the
-    first if it is better by `gain` standard errors. Those that are worse by no more than
+    best one's by `worse` metres; distances beyond `far` metres count as that. One takes the place
+    of the first if it is better by `gain` standard errors. Those that are worse by no more than
     `undecided` standard errors, and in alignment score by no more than `alike`, are as probable.
     """
 
@@ -119,9 +119,9 @@ class SearchConfig:
     best `coarse` of them are refined `coarse_steps` steps with `coarse_points` observed points,
     which reach the surface from `coarse_distance`; the best `middle` of those, and then the best
     `fine`, are refined again, each with more points, without those within `same_turn` radians and
-    `same_shift` metres of a better one. A stored object has its stored size. That it
-    is something of the kind, of another size, is a hypothesis of its own, with a size that is
-    refined with the pose: the best `rescaled` placements begin it at `sizes` times the true size,
+    `same_shift` metres of a better one. A stored object has its stored size. That it is something
+    of the kind, of another size, is a hypothesis of its own, with a size that is refined with the
+    pose: the best `rescaled` placements begin it at `sizes` times the true size,
     observed points pull from `size_distance` metres, and sizes whose logarithm is within
     `least_size_change` of 0 or beyond `most_size` are dropped. Its alignment score falls by
     size_cost + size_spread_cost * ln(size)^2. No other size is tried where the score reaches

@@ -84,7 +84,6 @@ def _ramp(depth: NDArray[np.floating], config: VerificationConfig) -> NDArray[np
 def _placed(T_target_source: Array, points: Array) -> Floats:
     """Points (n, 3) placed in B ways, (3, B, n): the axis comes first, since long contiguous rows
     are what NumPy is fast on; in single precision, which is right to a micrometre."""
-    T = T_target_source.astype(np.float32)
-    placed = T[:, :3, :3].swapaxes(0, 1) @ points.T.astype(np.float32)
-    placed += T[:, :3, 3].T[..., None]
-    return np.asarray(placed)
+    placed = T_target_source[:, :3, :3].swapaxes(0, 1) @ points.T
+    placed += T_target_source[:, :3, 3].T[..., None]
+    return np.asarray(placed, dtype=np.float32)
