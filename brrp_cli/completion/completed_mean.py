@@ -51,13 +51,16 @@ def network_grid(
     thinks = _network(part)
     asked = np.full(odd.shape, -config.limit, np.float32)
     asked[odd] = thinks(at[odd])
-    doubtful = (maximum_filter(asked, 3) > -config.beyond_doubt) & (
-        minimum_filter(asked, 3) < config.beyond_doubt
+    # From each node to the next one along each axis.
+    doubtful = (maximum_filter(asked, 2, origin=-1) > -config.beyond_doubt) & (
+        minimum_filter(asked, 2, origin=-1) < config.beyond_doubt
     )
     for axis, count in enumerate(empty.shape):
         asked = _doubled(asked, axis, count)
         doubtful = doubtful.repeat(2, axis=axis).take(np.arange(count), axis=axis)
     doubtful &= ~empty
+    # These have been asked.
+    doubtful[::2, ::2, ::2] = False
     asked[doubtful] = thinks(nodes[doubtful])
     return asked
 

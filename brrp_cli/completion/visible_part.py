@@ -156,7 +156,7 @@ def visible_part(
     )
 
 
-def _tree(points: Array) -> cKDTree:
+def _tree(points: NDArray[np.floating]) -> cKDTree:
     """Of points (n, d) on a grid that are asked from far away: cells halved in the middle are
     passed by sooner there than those that hold the same number of points each."""
     return cKDTree(points, leafsize=32, balanced_tree=False, compact_nodes=False)
