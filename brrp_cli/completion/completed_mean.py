@@ -39,7 +39,7 @@ def network_grid(
     """What the network thinks (nx, ny, nz) at nodes (nx, ny, nz, 3); anything where it is empty.
 
     The network is asked at every second node along each axis, and at the nodes between where those
-    around are neither all out of doubt (`beyond_doubt`) inside nor all outside.
+    at the corners are neither all out of doubt (`beyond_doubt`) inside nor all outside.
     """
     near = binary_dilation(~empty, np.ones((3, 3, 3), bool))
     # One node more at the end where the last one would have none after it.
