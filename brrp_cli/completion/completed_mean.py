@@ -39,7 +39,7 @@ def network_grid(
     """What the network thinks (nx, ny, nz) at nodes (nx, ny, nz, 3); anything where it is empty.
 
     The network is asked at every second node along each axis, and at the nodes between where those
-    at the corners are neither all out of doubt (`beyond_doubt`) inside nor all outside.
+    around are neither all out of doubt (`beyond_doubt`) inside nor all outside.
     """
     near = binary_dilation(~empty, np.ones((3, 3, 3), bool))
     # One node more at the end where the last one would have none after it.
@@ -51,9 +51,8 @@ def network_grid(
     thinks = _network(part)
     asked = np.full(odd.shape, -config.limit, np.float32)
     asked[odd] = thinks(at[odd])
-    # From each node to the next one along each axis.
-    doubtful = (maximum_filter(asked, 2, origin=-1) > -config.beyond_doubt) & (
-        minimum_filter(asked, 2, origin=-1) < config.beyond_doubt
+    doubtful = (maximum_filter(asked, 3) > -config.beyond_doubt) & (
+        minimum_filter(asked, 3) < config.beyond_doubt
     )
     for axis, count in enumerate(empty.shape):
         asked = _doubled(asked, axis, count)
