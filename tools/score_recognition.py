@@ -3,9 +3,9 @@
     python tools/score_recognition.py SCENES... --prior PRIOR --data-root DATA [-o rows.jsonl]
 
 For each set of scenes (published layout, as tools/make_scenes.py writes it), over the true objects
-that the prior holds, of which the first view shows 1,000 pixels or more and which the image's
-border does not cut: how many are recognised after masks were mended, by what the mask was before
-that. --truth takes the true masks instead.
+that the prior holds, of which the first view has 1,000 pixels of depth or more and which the
+image's border does not cut: how many are recognised after masks were mended, by what the mask was
+before that. --truth takes the true masks instead.
 
 own      a mask of its own, IoU over 0.75
 shared   its mask holds another object, too: a quarter of the mask, or 40 % of that object
@@ -204,7 +204,9 @@ def main() -> None:
     parser.add_argument("--prior", type=Path, required=True)
     parser.add_argument("--data-root", type=Path, required=True)
     parser.add_argument("--truth", action="store_true", help="True masks in place of made ones.")
-    parser.add_argument("--least", type=int, default=1000, help="Pixels that an object shows.")
+    parser.add_argument(
+        "--least", type=int, default=1000, help="Pixels of depth that an object has."
+    )
     parser.add_argument("-o", "--output", type=Path, help="All rows, as lines of JSON.")
     arguments = parser.parse_args()
     prior = open_prior(arguments.prior)
