@@ -14,6 +14,7 @@ from brrp_cli.completion.network import fitted
 from brrp_cli.completion.point_features import point_features
 from brrp_cli.completion.visible_part import VisiblePart
 from brrp_cli.config import MeanConfig
+from brrp_cli.frames.dilate import dilated
 from brrp_cli.frames.frame import BACKGROUND, Frame
 from brrp_cli.frames.projection import at_pixels, depth_behind
 from brrp_cli.observation.support_plane import Plane
@@ -57,6 +58,8 @@ def network_grid(
         asked = _doubled(asked, axis, count)
         doubtful = doubtful.repeat(2, axis=axis).take(np.arange(count), axis=axis)
     doubtful &= ~empty
+    # These have been asked.
+    doubtful[::2, ::2, ::2] = False
     asked[doubtful] = thinks(nodes[doubtful])
     return asked
 
@@ -128,7 +131,7 @@ def empty_space(
     empty = np.nan_to_num(behind, nan=-np.inf) > config.carve_depth
     if plane is not None:
         empty |= plane.signed_distance(points) < -config.carve_plane
-    own = binary_dilation(frame.segmap == object_id, iterations=config.carve_pixels)
+    own = dilated(frame.segmap == object_id, config.carve_pixels)
     background = np.where((frame.segmap == BACKGROUND) & ~own, 1, 0)
     close = np.nan_to_num(behind, nan=-np.inf) > -config.carve_behind
     return empty | (close & (at_pixels(points, background, frame) == 1))

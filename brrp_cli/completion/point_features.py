@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 from brrp_cli.completion.convex_hull import outside_hull
 from brrp_cli.completion.visible_part import VisiblePart
@@ -40,7 +39,7 @@ def point_features(points: Array, part: VisiblePart) -> Features:
     local_thickness = part.thickness.ravel()[pixel] * metres
 
     outside = outside_hull(points, part.facets)
-    away, nearest = cKDTree(part.seen).query(points)
+    away, nearest = part.tree.query(points)
     normal = part.normals[nearest]
     upright = points @ part.up
     if part.plane is None or part.height_map is None:
@@ -52,9 +51,7 @@ def point_features(points: Array, part: VisiblePart) -> Features:
         height = part.plane.signed_distance(points)
         over_map = part.height_map.above(points)
         T = part.height_map.T_plane_cam
-        beside, _ = cKDTree(transform_points(T, part.seen)[:, :2]).query(
-            transform_points(T, points)[:, :2]
-        )
+        beside, _ = part.tree_on_plane.query(transform_points(T, points)[:, :2])
         lower = part.seen[nearest] @ part.up - upright
     # As if what is seen were the front of something round.
     flat = np.stack([points @ part.across, points @ part.ahead], axis=1)
@@ -136,7 +133,7 @@ def _behind(
     points: Array, pixel: NDArray[np.int64], visible: NDArray[np.bool_], part: VisiblePart
 ) -> Array:
     """How far (n,) points (n, 3) lie behind the measured depth, metres; 0 where there is none."""
-    measured = part.frame.points[..., 2].ravel()[pixel]
+    measured = part.frame.depth.ravel()[pixel]
     behind = np.where(visible, points[:, 2] - measured, 0.0)
     return np.clip(np.nan_to_num(behind), -part.config.far, part.config.far)
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import torch
 from torch import Tensor, nn
-from torch.nn.functional import grid_sample, interpolate
+from torch.nn.functional import conv2d, grid_sample, interpolate, pad
 
 from brrp_cli.completion.volume import CHANNELS
 
@@ -120,7 +120,23 @@ class Block(nn.Module):
 
     def forward(self, x: Tensor) -> Tensor:
         """As many channels as before."""
-        return x + torch.relu(self.norm(self.convolution(x)))
+        return x + torch.relu(self.norm(convolved(x, self.convolution)))
+
+
+def convolved(x: Tensor, convolution: nn.Conv3d) -> Tensor:
+    """convolution(x), 3 x 3 x 3 with a padding of 1, of x (B, C, n, n, n).
+
+    torch has no fast kernel for a single volume on a processor: its layers are convolved as a batch
+    of images, each with the one before and the one after it as more channels.
+    """
+    if len(x) != 1 or x.is_cuda:
+        found: Tensor = convolution(x)
+        return found
+    layers = pad(x[0], (0, 0, 0, 0, 1, 1)).transpose(0, 1)
+    count = x.shape[2]
+    images = torch.cat([layers[step : step + count] for step in range(3)], dim=1)
+    kernels = convolution.weight.transpose(1, 2).flatten(1, 2)
+    return conv2d(images, kernels, convolution.bias, padding=1).transpose(0, 1)[None]
 
 
 class Join(nn.Module):

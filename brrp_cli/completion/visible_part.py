@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +17,7 @@ from brrp_cli.completion.silhouette import Image, silhouettes
 from brrp_cli.config import CompletionConfig
 from brrp_cli.frames.frame import Frame
 from brrp_cli.frames.projection import depth_behind
-from brrp_cli.geometry import normalise
+from brrp_cli.geometry import normalise, transform_points
 from brrp_cli.observation.subsample import grid_subsample
 from brrp_cli.observation.support_plane import Plane
 
@@ -78,6 +79,17 @@ class VisiblePart:
     def center(self) -> float:
         """How far behind the front the middle of something round is."""
         return max(self.width, self.back - self.front) / 2
+
+    @cached_property
+    def tree(self) -> cKDTree:
+        """Of the seen points."""
+        return _tree(self.seen)
+
+    @cached_property
+    def tree_on_plane(self) -> cKDTree:
+        """The same of where they lie along the plane, by the height map's axes."""
+        assert self.height_map is not None
+        return _tree(transform_points(self.height_map.T_plane_cam, self.seen)[:, :2])
 
     @property
     def extent(self) -> Array:
@@ -142,6 +154,12 @@ def visible_part(
         thickness=thickness,
         config=config,
     )
+
+
+def _tree(points: NDArray[np.floating]) -> cKDTree:
+    """Of points (n, d) on a grid that are asked from far away: cells halved in the middle are
+    passed by sooner there than those that hold the same number of points each."""
+    return cKDTree(points, leafsize=32, balanced_tree=False, compact_nodes=False)
 
 
 def surface_normals(seen: Array, neighbours: int) -> Array:

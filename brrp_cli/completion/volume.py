@@ -65,7 +65,7 @@ def volume_of(part: VisiblePart, config: VolumeConfig) -> Volume:
     ).reshape(-1, 3)
     pixel, visible = pixel_numbers(centres, frame)
     label = np.where(visible, frame.segmap.ravel()[pixel], BACKGROUND)
-    measured = frame.points[..., 2].ravel()[pixel]
+    measured = frame.depth.ravel()[pixel]
     known = visible & np.isfinite(measured)
     behind = np.where(known, centres[:, 2] - np.where(known, measured, 0), 0.0)
     own = label == part.object_id

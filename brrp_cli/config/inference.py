@@ -28,19 +28,21 @@ class InferenceConfig:
 class MeanConfig:
     """Prior mean functions of hypotheses, as logits.
 
-    A placed shape is -(signed distance) / width, limited to +-limit; an alignment score under
-    `sure` widens it by `doubt` metres for each unit. An object that none explains is completed on a
-    grid of about `nodes` nodes by a network, which is evaluated at every node where the coarse ones
-    around are not all `beyond_doubt`; its logit is `shell_logit` at least for `shell` metres behind
-    what is seen of it, or `shell_nodes` of the grid's spacings where these are longer, and
-    `shell_before` metres in front. Space is empty that lies more than `carve_depth` in front of the
-    measured depth, or `carve_plane` below the plane, or less than `carve_behind` behind what is no
-    object's and more than `carve_pixels` from the mask.
+    A placed shape is -(signed distance) / width, limited to +-limit, with distances that are exact
+    within `exact` metres of its surface; an alignment score under `sure` widens it by `doubt`
+    metres for each unit. An object that none explains is completed on a grid of about `nodes` nodes
+    by a network, which is evaluated at every node where the coarse ones around are not all
+    `beyond_doubt`; its logit is `shell_logit` at least for `shell` metres behind what is seen of
+    it, or `shell_nodes` of the grid's spacings where these are longer, and `shell_before` metres in
+    front. Space is empty that lies more than `carve_depth` in front of the measured depth, or
+    `carve_plane` below the plane, or less than `carve_behind` behind what is no object's and more
+    than `carve_pixels` from the mask.
     """
 
     nodes: int = 200_000
     width: float = 0.0005
     sure: float = 0.9
+    exact: float = 0.004
     doubt: float = 0.004
     limit: float = 5.0
     beyond_doubt: float = 1.5

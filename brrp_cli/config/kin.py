@@ -37,6 +37,7 @@ class KinConfig:
     `coarse_near` metres, less `coarse_far_weight` times the distances, which end at `coarse_far`
     times that, and `coarse_pull` times the prior. The best `starts` of them, at first `starts_each`
     of one object at most, take `steps` Gauss-Newton steps with `step_seen` and `step_free` points,
+    of which they are judged by too: the best `middle` after `first_steps` of them go on. Steps are
     damped by a share `damping`, of at most `step_turn` radians, `step_shift` metres, `step_size` of
     a logarithm and `step_taper`; the taper, 1 of a cone to its tip, stays under `most_taper`.
     `sigma`, `free_sigma` : metres, standard deviations of the distances of seen points and of free
@@ -99,6 +100,8 @@ class KinConfig:
     starts: int = 48
     starts_each: int = 3
     steps: int = 8
+    first_steps: int = 4
+    middle: int = 20
     step_seen: int = 160
     step_free: int = 240
     damping: float = 0.02

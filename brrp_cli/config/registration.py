@@ -89,8 +89,9 @@ class TurnConfig:
     under which the mean distance of `surface_points` of its surface from itself is less than
     `itself`, metres. The `count` best of them by `coarse_points` observed points, first those that
     are `apart` radians from all better ones, are refined, and the best `judged` held against
-    `points` observed ones; distances beyond `far` metres count as that. One takes the place of the
-    first if it is better by `gain` standard errors. Those that are worse by no more than
+    `points` observed ones, without those whose mean distance on the coarse field is longer than the
+    best one's by `worse` metres; distances beyond `far` metres count as that. One takes the place
+    of the first if it is better by `gain` standard errors. Those that are worse by no more than
     `undecided` standard errors, and in alignment score by no more than `alike`, are as probable.
     """
 
@@ -100,6 +101,7 @@ class TurnConfig:
     itself: float = 0.003
     count: int = 16
     judged: int = 8
+    worse: float = 0.0005
     apart: float = 0.25
     coarse_points: int = 300
     points: int = 2000
@@ -116,15 +118,18 @@ class SearchConfig:
     Initial poses are `matchings` feature matchings and every resting pose turned `turns` times. The
     best `coarse` of them are refined `coarse_steps` steps with `coarse_points` observed points,
     which reach the surface from `coarse_distance`; the best `middle` of those, and then the best
-    `fine`, are refined again, each with more points. A stored object has its stored size. That it
-    is something of the kind, of another size, is a hypothesis of its own, with a size that is
-    refined with the pose: the best `rescaled` placements begin it at `sizes` times the true size,
+    `fine`, are refined again, each with more points, without those within `same_turn` radians and
+    `same_shift` metres of a better one. A stored object has its stored size. That it is something
+    of the kind, of another size, is a hypothesis of its own, with a size that is refined with the
+    pose: the best `rescaled` placements begin it at `sizes` times the true size,
     observed points pull from `size_distance` metres, and sizes whose logarithm is within
     `least_size_change` of 0 or beyond `most_size` are dropped. Its alignment score falls by
     size_cost + size_spread_cost * ln(size)^2. No other size is tried where the score reaches
     `settled`, and nothing is refined further where none of the placements reaches `hopeless` or all
     stay `beaten` behind another model's. Of placements whose surfaces lie within `distinct` metres
-    the best is kept, `kept` in all. rotations : evenly spread, which retrieval tries too.
+    the best is kept, `kept` in all. An object is not placed at all where another one, with a score
+    of `explained`, explains what is seen, and P(c|R) is less than a share `unlikely` of that one's.
+    rotations : evenly spread, which retrieval tries too.
     """
 
     turns: int = 24
@@ -151,6 +156,8 @@ class SearchConfig:
     fine_distance: float = 0.01
     fine_points: int = 1000
     fine_steps: int = 10
+    same_turn: float = 0.02
+    same_shift: float = 0.001
     seen_points: int = 150
     sizes: tuple[float, ...] = (0.85, 1.18)
     rescaled: int = 2
@@ -164,6 +171,8 @@ class SearchConfig:
     settled: float = 0.9
     distinct: float = 0.0015
     kept: int = 6
+    explained: float = 0.85
+    unlikely: float = share(0.05)
     alignment_score: VerificationConfig = field(default_factory=VerificationConfig)
     colour: ColourConfig = field(default_factory=ColourConfig)
     about_itself: TurnConfig = field(default_factory=TurnConfig)

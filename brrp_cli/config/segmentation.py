@@ -230,7 +230,8 @@ class LeftOutConfig:
 
     cut : part of a mask's outline on the image's border from which on it is left out
     lowest : percentile of its heights that counts as its lower end; stands : metres; what ends no
-        higher stands on the table
+        higher stands on the table, and so does what ends no higher than `round` times its top, but
+        `round_stands` metres at most: the lower half of a ball
     foot : percentile of its outline's heights up to which the outline is its foot; reach : pixels
         from the foot that are looked at; touch : metres in depth of what touches it; held : part of
         them that are nearer, or another object that touches it, in which case it may stand
@@ -241,6 +242,8 @@ class LeftOutConfig:
     cut: float = share(0.08)
     lowest: float = between(5.0, 0.0, 100.0)
     stands: float = 0.04
+    round: float = share(0.6)
+    round_stands: float = 0.06
     foot: float = between(25.0, 0.0, 100.0)
     reach: int = between(6, 1, 64)
     touch: float = 0.02

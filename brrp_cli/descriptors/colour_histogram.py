@@ -53,16 +53,18 @@ def colour_histograms(
     shared linearly among the eight bins around it.
     """
     lit = np.minimum(rgb[None] * gains[:, None], 255.0)
-    position = _positions(lab(lit))
+    # The axis comes first: long contiguous rows are what NumPy is fast on.
+    position = np.ascontiguousarray(np.moveaxis(_positions(lab(lit)), -1, 0))
     low = position.astype(np.int64)
     rest = position - low
+    parts = np.stack([1 - rest, rest], axis=1)
     counts = np.zeros((len(gains), COLOUR_BINS))
     row = np.arange(len(gains))[:, None] * COLOUR_BINS
-    for corner in product((0, 1), repeat=3):
-        at = low + np.array(corner)
-        weight = np.prod(np.where(np.array(corner), rest, 1 - rest), axis=-1) * shares
-        index = (at[..., 0] * AB_BINS + at[..., 1]) * AB_BINS + at[..., 2]
-        counts += np.bincount((row + index).ravel(), weight.ravel(), minlength=counts.size).reshape(
+    first = row + (low[0] * AB_BINS + low[1]) * AB_BINS + low[2]
+    for x, y, z in product((0, 1), repeat=3):
+        weight = parts[0, x] * parts[1, y] * parts[2, z] * shares
+        index = first + ((x * AB_BINS + y) * AB_BINS + z)
+        counts += np.bincount(index.ravel(), weight.ravel(), minlength=counts.size).reshape(
             counts.shape
         )
     return (counts / np.maximum(counts.sum(axis=1, keepdims=True), 1e-12)).astype(np.float32)

@@ -79,6 +79,14 @@ class Frame:
         return np.isfinite(self.points).all(axis=-1) & (self.points[..., 2] > 0)
 
     @cached_property
+    def depth(self) -> NDArray[np.float32]:
+        """(H, W) metres along z, NaN where there is no return: that of `points`, in one piece of
+        memory, for those who look up pixels."""
+        depth = np.ascontiguousarray(self.points[..., 2])
+        depth.setflags(write=False)
+        return depth
+
+    @cached_property
     def object_ids(self) -> list[int]:
         """Ids in the mask, ascending, without the background."""
         return [int(i) for i in np.unique(self.segmap) if i != BACKGROUND]

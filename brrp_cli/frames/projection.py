@@ -12,7 +12,7 @@ def depth_behind(points: NDArray[np.floating], frame: Frame) -> NDArray[np.float
     """How far behind each of `points` (n, 3), camera frame, its pixel's measured depth lies,
     metres: positive in free space, negative where the point is hidden. NaN where the point's pixel
     has no depth, lies outside of the image or behind the camera."""
-    return np.asarray(at_pixels(points, frame.points[..., 2], frame) - points[:, 2])
+    return np.asarray(at_pixels(points, frame.depth, frame) - points[:, 2])
 
 
 def at_pixels(

@@ -99,17 +99,25 @@ class HypothesisPosterior:
 
     def logits(self, points: NDArray[np.floating]) -> NDArray[np.float32]:
         """m + w . phi (P, n) at points (n, 3), metres, camera frame."""
-        means = np.stack([mean.logits(points) for mean in self.means])
-        return np.asarray(means[self.which] + self.correction.logits(points))
+        return np.asarray(self._means(points) + self.correction.logits(points))
+
+    def _means(self, points: NDArray[np.floating]) -> NDArray[np.float32]:
+        """m of each particle's hypothesis (P, n) at points (n, 3)."""
+        return np.stack([mean.logits(points) for mean in self.means])[self.which]
 
     def probability(self, points: NDArray[np.floating]) -> NDArray[np.float32]:
         """Occupancy probability (n,): mean over particles of sigmoid(m + w . phi); 0 out of
         bounds."""
         points = np.asarray(points)
-        inside = ((points >= self.box[0]) & (points <= self.box[1])).all(axis=1)
+        inside = self._inside(points)
         found = np.zeros(len(points), np.float32)
         found[inside] = self.mean_occupancy(self.logits(points[inside]))
         return found
+
+    def _inside(self, points: NDArray[np.floating]) -> NDArray[np.bool_]:
+        """Which of points (n, 3) lie within the bounds."""
+        inside: NDArray[np.bool_] = ((points >= self.box[0]) & (points <= self.box[1])).all(axis=1)
+        return inside
 
     def probability_volume(self, axes: Axes) -> NDArray[np.float32]:
         """Occupancy probability (nx, ny, nz) on a grid of camera-frame coordinates, metres."""
@@ -142,11 +150,21 @@ class HypothesisPosterior:
     def surface_uncertainty(self, vertices: NDArray[np.floating]) -> NDArray[np.float32]:
         """Standard deviation (n,), metres, of the surface's place at its vertices (n, 3).
 
-        Occupancy falls from 1 to 0 across a surface: the more slowly, the less is known where. What
-        the depth behind a completed shape has in `common` is added in squares.
+        Occupancy falls from 1 to 0 across a surface: the more slowly, the less is known where. The
+        correction, whose kernels are centimetres wide, stays what it is on the way. What the depth
+        behind a completed shape has in `common` is added in squares.
         """
+        correction = self.correction.logits(vertices)
+
+        def occupied(points: NDArray[np.floating]) -> NDArray[np.float32]:
+            inside = self._inside(points)
+            found = np.zeros(len(points), np.float32)
+            logits = self._means(points[inside]) + correction[:, inside]
+            found[inside] = self.mean_occupancy(logits)
+            return found
+
         gradient = [
-            (self.probability(vertices + step) - self.probability(vertices - step)) / (2 * STEP)
+            (occupied(vertices + step) - occupied(vertices - step)) / (2 * STEP)
             for step in np.eye(3) * STEP
         ]
         placed = np.array([isinstance(mean, PlacedShape) for mean in self.means])

@@ -105,8 +105,9 @@ class PlacedShape:
             local = transform_points(np.linalg.inv(self.T_cam_shape), np.asarray(points))
             distance = self.shape.field.signed_distance(local) * self.unit
         else:
-            band = self.limit * self.width if self.exact is None else self.exact
-            distance = self.signed_distance(points, band)
+            # Where the logit is at its limit, distances need not be exact.
+            band = self.limit * self.width
+            distance = self.signed_distance(points, min(band, self.exact or band))
         limited = np.clip(-distance / self.width, -self.limit, self.limit)
         return np.asarray(limited, dtype=np.float32)
 

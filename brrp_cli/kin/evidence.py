@@ -11,7 +11,9 @@ from numpy.typing import NDArray
 from scipy.ndimage import binary_dilation, distance_transform_edt, minimum_filter
 
 from brrp_cli.config import KinConfig, SensorConfig
+from brrp_cli.frames.dilate import dilated
 from brrp_cli.frames.frame import Frame
+from brrp_cli.frames.last_frame import kept_for_last_frame
 from brrp_cli.frames.projection import at_pixels
 from brrp_cli.geometry import transform_points
 from brrp_cli.observation.sensor_noise import depth_deviation
@@ -106,13 +108,19 @@ def gather(
 def _told_depth(frame: Frame, object_id: int, config: KinConfig) -> Floats:
     """Depth (H, W), the nearest of all pixels within `config.blur`: space is free where all of them
     say so. NaN at pixels of others within the ring of those that may be anyone's."""
+    depth = _nearest_depth(frame, config.blur).copy()
     own = frame.segmap == object_id
-    measured = frame.points[..., 2]
-    known = np.where(np.isfinite(measured), measured, np.inf)
-    nearest = minimum_filter(known, size=2 * config.blur + 1)
-    depth = np.where(np.isfinite(measured) & np.isfinite(nearest), nearest, np.nan)
-    depth[binary_dilation(own, iterations=config.ring[0]) & ~own] = np.nan
-    return depth.astype(np.float32)
+    depth[dilated(own, config.ring[0]) & ~own] = np.nan
+    return depth
+
+
+@kept_for_last_frame
+def _nearest_depth(frame: Frame, blur: int) -> Floats:
+    """Depth (H, W), the nearest of all pixels within `blur`, NaN where none is measured."""
+    known = np.where(np.isfinite(frame.depth), frame.depth, np.inf)
+    nearest = minimum_filter(known, size=2 * blur + 1)
+    told = np.isfinite(frame.depth) & np.isfinite(nearest)
+    return np.where(told, nearest, np.nan).astype(np.float32)
 
 
 def _free(

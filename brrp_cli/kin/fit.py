@@ -98,11 +98,21 @@ def fit_kin(evidence: Evidence, library: Library, config: KinConfig) -> Fits:
     begun = starts(evidence, library, config)
     if not len(begun):
         return judged(begun, evidence, library, config)
-    fits = _best(refined(begun, evidence, library, config), evidence, library, config)
+    some = replace(
+        evidence, seen=evidence.seen[: config.step_seen], free=evidence.free[: config.step_free]
+    )
+    first = replace(config, steps=config.first_steps)
+    rest = replace(config, steps=config.steps - config.first_steps)
+    fits = _best(refined(begun, some, library, first), some, library, config, config.middle)
+    fits = _best(refined(fits.placements, some, library, rest), some, library, config, config.kept)
     every = replace(config, step_seen=len(evidence.seen), step_free=len(evidence.free))
-    return _best(refined(fits.placements, evidence, library, every), evidence, library, config)
+    placements = refined(fits.placements, evidence, library, every)
+    return _best(placements, evidence, library, config, config.kept)
 
 
-def _best(placements: Placements, evidence: Evidence, library: Library, config: KinConfig) -> Fits:
+def _best(
+    placements: Placements, evidence: Evidence, library: Library, config: KinConfig, count: int
+) -> Fits:
+    """The `count` best, best first."""
     fits = judged(placements, evidence, library, config)
-    return fits[np.argsort(-fits.score, kind="stable")[: config.kept]]
+    return fits[np.argsort(-fits.score, kind="stable")[:count]]

@@ -89,9 +89,14 @@ def reconstruct_by_hypotheses(
 
         def searched(skipped: frozenset[str]) -> list[list[Hypothesis]]:
             found: list[list[Hypothesis]] = []
-            for name, _ in chosen:
+            # P(c|R) of the most probable object that explains what is seen.
+            explained = 0.0
+            for name, probability in chosen:
                 if name in skipped:
                     found.append(begun.get(name, []))
+                    continue
+                if probability < hypotheses.search.unlikely * explained:
+                    found.append([])
                     continue
                 best = (each.alignment_score for group in found for each in group)
                 found.append(
@@ -105,6 +110,8 @@ def reconstruct_by_hypotheses(
                         max(best, default=-np.inf),
                     )
                 )
+                if found[-1][0].alignment_score >= hypotheses.search.explained:
+                    explained = max(explained, probability)
             return found
 
         def weighed(found: list[list[Hypothesis]]) -> tuple[list[Hypothesis], list[float], Array]:

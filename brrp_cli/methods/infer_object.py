@@ -98,7 +98,13 @@ def placed_shape(
     )
     doubt = mean.doubt * max(0.0, mean.sure - hypothesis.alignment_score)
     shape = PlacedShape(
-        stored.name, stored.shape, hypothesis.T_cam_object, mean.width, mean.limit, covariance
+        stored.name,
+        stored.shape,
+        hypothesis.T_cam_object,
+        mean.width,
+        mean.limit,
+        covariance,
+        exact=mean.exact,
     )
     if alike is not None:
         shape = replace(shape, alike=alike @ hypothesis.model.T_model_object)

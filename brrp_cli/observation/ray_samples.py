@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from brrp_cli.config import ObservationConfig
 from brrp_cli.frames.frame import BACKGROUND, Frame
+from brrp_cli.frames.last_frame import kept_for_last_frame
 from brrp_cli.observation.subsample import grid_subsample
 from brrp_cli.observation.support_plane import Plane, fit_plane
 from brrp_cli.seeds import child_rng
@@ -61,8 +62,7 @@ def observe(
     if not centers:
         return SceneObservation(plane=None, objects={}, too_few=too_few)
 
-    background = frame.points[frame.valid & (frame.segmap == BACKGROUND)]
-    plane = fit_plane(background, config, seed, np.mean(list(centers.values()), axis=0))
+    plane = scene_plane(frame, config, seed)
     if plane is None:
         log.warning("No support plane near the objects: nothing is sampled below one")
 
@@ -94,6 +94,18 @@ def observe(
 
     objects = dict(zip(centers, in_threads(sample, list(centers), workers), strict=True))
     return SceneObservation(plane=plane, objects=objects, too_few=too_few)
+
+
+@kept_for_last_frame
+def scene_plane(frame: Frame, config: ObservationConfig, seed: int) -> Plane | None:
+    """The support plane of a frame's objects, of those with enough points; None where none is
+    found."""
+    points = [frame.object_points(i) for i in frame.object_ids]
+    centers = [box_center(p) for p in points if len(p) >= config.min_points]
+    if not centers:
+        return None
+    background = frame.points[frame.valid & (frame.segmap == BACKGROUND)]
+    return fit_plane(background, config, seed, np.mean(centers, axis=0))
 
 
 def ray_samples(

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from brrp_cli.config import SensorConfig
 from brrp_cli.frames.frame import BACKGROUND, Frame
+from brrp_cli.frames.last_frame import kept_for_last_frame
 from brrp_cli.geometry import cells_of
 from brrp_cli.observation.support_plane import Plane, plane_frame
 
@@ -26,6 +27,7 @@ def depth_deviation(depth: NDArray[np.floating], config: SensorConfig) -> Array:
     return np.asarray(config.noise + config.noise_growth * np.asarray(depth, np.float64) ** 2)
 
 
+@kept_for_last_frame
 def wave_deviation(frame: Frame, plane: Plane | None, config: SensorConfig) -> float:
     """Standard deviation, metres, of the mean depth of a patch `config.patch` metres wide: what
     waves and steps make of the table, along the camera's rays. `config.wave` at least, and where

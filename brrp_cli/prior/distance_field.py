@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,15 +44,50 @@ class DistanceField:
         distance[beyond] += np.linalg.norm(off[:, beyond], axis=0) * self.spacing
         return np.asarray(distance)
 
+    def distance(self, points: NDArray[np.float32]) -> NDArray[np.float32]:
+        """`signed_distance` (n,) at points (3, n), in single precision."""
+        (x, y, z), low, rise, off = self._corners(points)
+        edges = [up * z + start for start, up in zip(low, rise, strict=True)]
+        near = (edges[1] - edges[0]) * y + edges[0]
+        value = ((edges[3] - edges[2]) * y + edges[2] - near) * x + near
+        beyond = np.flatnonzero(off.any(axis=0))
+        if len(beyond):
+            value[beyond] += np.linalg.norm(off[:, beyond], axis=0) * np.float32(self.spacing)
+        return np.asarray(value)
+
     def distance_and_gradient(
         self, points: NDArray[np.float32]
     ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
         """Distance (n,) at points (3, n), as `signed_distance` has it, and its gradient (3, n)."""
+        (x, y, z), low, rise, off = self._corners(points)
+        edges = [start + z * up for start, up in zip(low, rise, strict=True)]
+        left, right = edges[1] - edges[0], edges[3] - edges[2]
+        near, far = edges[0] + y * left, edges[2] + y * right
+        up_near, up_far = rise[0] + y * (rise[1] - rise[0]), rise[2] + y * (rise[3] - rise[2])
+        along = far - near
+        value = near + x * along
+        slope = np.stack([along, left + x * (right - left), up_near + x * (up_far - up_near)])
+        slope /= np.float32(self.spacing)
+        beyond = np.flatnonzero(off.any(axis=0))
+        if len(beyond):
+            off = off[:, beyond]
+            way = np.linalg.norm(off, axis=0)
+            value[beyond] += way * np.float32(self.spacing)
+            slope[:, beyond] = np.where(off != 0, off / way, slope[:, beyond])
+        return value, slope
+
+    def _corners(
+        self, points: NDArray[np.float32]
+    ) -> tuple[
+        NDArray[np.floating], list[NDArray[np.float32]], list[NDArray[np.float32]], NDArray[Any]
+    ]:
+        """Of the cells that hold points (3, n): how far along it each lies (3, n), values at the
+        four lower corners, (n,) each, along y, then x; how much more those above them are; and how
+        far off the grid each lies (3, n), in spacings."""
         shape = np.array(self.values.shape, dtype=np.int32)[:, None]
         at = (points - self.lower[:, None].astype(np.float32)) / np.float32(self.spacing)
         within = np.clip(at, 0, (shape - 1).astype(np.float32))
         cell = np.minimum(within.astype(np.int32), shape - 2)
-        x, y, z = within - cell
         on_x, on_y = int(shape[1, 0] * shape[2, 0]), int(shape[2, 0])
         first = cell[0] * on_x + cell[1] * on_y + cell[2]
         nodes = self.values.ravel()
@@ -62,22 +97,7 @@ class DistanceField:
             nodes.take(first + (step + 1)) - start
             for step, start in zip((0, on_y, on_x, on_x + on_y), low, strict=True)
         ]
-        edges = [start + z * up for start, up in zip(low, rise, strict=True)]
-        left, right = edges[1] - edges[0], edges[3] - edges[2]
-        near, far = edges[0] + y * left, edges[2] + y * right
-        up_near, up_far = rise[0] + y * (rise[1] - rise[0]), rise[2] + y * (rise[3] - rise[2])
-        along = far - near
-        value = near + x * along
-        slope = np.stack([along, left + x * (right - left), up_near + x * (up_far - up_near)])
-        slope /= np.float32(self.spacing)
-        off = at - within
-        beyond = np.flatnonzero(off.any(axis=0))
-        if len(beyond):
-            off = off[:, beyond]
-            way = np.linalg.norm(off, axis=0)
-            value[beyond] += way * np.float32(self.spacing)
-            slope[:, beyond] = np.where(off != 0, off / way, slope[:, beyond])
-        return value, slope
+        return within - cell, low, rise, at - within
 
 
 def distance_field(mesh: trimesh.Trimesh, config: FieldConfig) -> DistanceField:

@@ -15,9 +15,12 @@ from brrp_cli.prior.distance_field import DistanceField
 
 # Rays that vote on which side of the surface a point lies: one that grazes an edge is outvoted.
 RAYS = 3
+# What a field is off by at most, in spacings: the mean of exact distances at the corners of a cell,
+# weighed by how near they are, is off by sqrt(3) / 2 at most; its half precision comes on top.
+OFF = 0.9
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class StoredShape:
     """A closed, outward mesh in the unit and frame of the field that goes with it.
 
@@ -87,24 +90,42 @@ class StoredShape:
         """
         points = np.asarray(points)
         distance = self.field.signed_distance(points)
-        near = np.flatnonzero(np.abs(distance) < band + self.field.spacing * np.sqrt(3))
+        near = np.flatnonzero(np.abs(distance) < band + OFF * self.field.spacing)
         if len(near):
-            distance[near] = self.nearest(points[near])[0]
+            exact, _ = self._nearest(points[near])
+            # Further from the surface than the field can be off, its sign is right.
+            unsure = np.abs(distance[near]) < OFF * self.field.spacing
+            inside = distance[near] < 0
+            inside[unsure] = self._inside(points[near[unsure]])
+            distance[near] = np.where(inside, -exact, exact)
         return distance
 
     def distance(self, points: NDArray[np.floating]) -> NDArray[np.float64]:
         """Exact distance (n,) of points (n, 3) from the surface, without a sign."""
-        query = import_open3d().core.Tensor(np.ascontiguousarray(points, dtype=np.float32))
-        return np.asarray(self.scene.compute_distance(query, nthreads=1).numpy(), dtype=np.float64)
+        distance = self.scene.compute_distance(_tensor(points), nthreads=1).numpy()
+        return np.asarray(distance, dtype=np.float64)
 
     def nearest(
         self, points: NDArray[np.floating]
     ) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
         """Exact distance (n,) of points (n, 3), negative inside, and the nearest face (n,)."""
-        o3d = import_open3d()
-        query = o3d.core.Tensor(np.ascontiguousarray(points, dtype=np.float32))
-        closest = self.scene.compute_closest_points(query, nthreads=1)
+        distance, face = self._nearest(points)
+        return np.where(self._inside(points), -distance, distance), face
+
+    def _nearest(
+        self, points: NDArray[np.floating]
+    ) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+        """The same without a sign."""
+        closest = self.scene.compute_closest_points(_tensor(points), nthreads=1)
         apart = closest["points"].numpy().astype(np.float64) - points
-        inside = self.scene.compute_occupancy(query, nthreads=1, nsamples=RAYS).numpy() > 0.5
-        distance = np.where(inside, -1.0, 1.0) * np.linalg.norm(apart, axis=1)
-        return distance, closest["primitive_ids"].numpy().astype(np.int64)
+        return np.linalg.norm(apart, axis=1), closest["primitive_ids"].numpy().astype(np.int64)
+
+    def _inside(self, points: NDArray[np.floating]) -> NDArray[np.bool_]:
+        """Which of points (n, 3) lie inside."""
+        occupied = self.scene.compute_occupancy(_tensor(points), nthreads=1, nsamples=RAYS)
+        return np.asarray(occupied.numpy() > 0.5)
+
+
+def _tensor(points: NDArray[np.floating]) -> Any:
+    """Points (n, 3) as Open3D takes them."""
+    return import_open3d().core.Tensor(np.ascontiguousarray(points, dtype=np.float32))

@@ -6,7 +6,8 @@ and colour can.
 
 from __future__ import annotations
 
-from functools import cache
+from dataclasses import dataclass
+from functools import cache, lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,8 +15,9 @@ from scipy.spatial.transform import Rotation
 
 from brrp_cli.config import ColourConfig
 from brrp_cli.frames.frame import Frame
-from brrp_cli.frames.projection import depth_behind, pixel_numbers
+from brrp_cli.frames.projection import pixel_numbers
 from brrp_cli.geometry import cells_of, transform_points
+from brrp_cli.prior.shape import StoredShape
 from brrp_cli.registration.model import Model
 
 Array = NDArray[np.float64]
@@ -76,33 +78,58 @@ def _compared(
     light's brightness and hue do not count. Both are means over cells of the surface: letters lie
     a little elsewhere. 0 where there is too little to see, or nothing but one colour. And the
     standard deviation of the stored colours, of 255."""
-    shape = model.stored.shape
-    rows = np.linspace(0, len(shape.vertices) - 1, config.vertices).astype(np.int64)
-    metric = shape.vertices[rows].astype(np.float64) * model.stored.half_extent
-    points = transform_points(T_cam_model, metric)
-    normals = shape.normals[rows] @ T_cam_model[:3, :3].T
-    facing = np.einsum("ni,ni->n", normals, points) < 0
+    sample = _sampled(model.stored.shape, model.stored.half_extent, config.vertices, config.cell)
+    # In the model's axes, where its normals are the same for all placements.
+    camera = np.linalg.inv(T_cam_model)[:3, 3]
+    facing = np.flatnonzero(sample.normals @ camera > sample.offsets)
+    points = transform_points(T_cam_model, sample.points[facing])
     pixel, inside = pixel_numbers(points, frame)
-    near = np.abs(np.nan_to_num(depth_behind(points, frame), nan=np.inf)) < config.near
-    seen = facing & inside & near
-    if seen.sum() < config.least_seen:
+    off = np.abs(frame.depth.ravel()[pixel] - points[:, 2])
+    near = np.flatnonzero(inside & (off < config.near))
+    if len(near) < config.least_seen:
         return 0.0, 0.0
-    cell = cells_of(metric[seen], config.cell)
+    seen = facing[near]
+    cell = sample.cell[seen]
     count = np.bincount(cell)
-    stored = _by_cell(shape.colours[rows[seen]], cell, count)
-    image = _by_cell(frame.rgb.reshape(-1, 3)[pixel[seen]], cell, count)
+    stored = _by_cell(sample.colours[seen], cell, count)
+    image = _by_cell(frame.rgb.reshape(-1, 3)[pixel[near]], cell, count)
     spread = np.array([np.linalg.norm(stored), np.linalg.norm(image)])
-    deviation = spread / np.sqrt(3 * count.sum())
+    deviation = spread / np.sqrt(3 * len(seen))
     if deviation.min() < config.plain:
         return 0.0, float(deviation[0])
     return float((stored * image).sum() / spread.prod()), float(deviation[0])
+
+
+@dataclass(frozen=True)
+class _Sample:
+    """Vertices of a stored mesh, metres, model's axes, whose colours are compared.
+
+    points, normals : (n, 3); offsets : (n,) of the planes through them; colours : (n, 3) uint8;
+    cell : (n,) number of the cell of the surface
+    """
+
+    points: Array
+    normals: Array
+    offsets: Array
+    colours: NDArray[np.uint8]
+    cell: NDArray[np.int64]
+
+
+@lru_cache(maxsize=64)
+def _sampled(shape: StoredShape, unit: float, vertices: int, cell: float) -> _Sample:
+    """Of `vertices` vertices; unit : metres of one unit of the shape's coordinates."""
+    rows = np.linspace(0, len(shape.vertices) - 1, vertices).astype(np.int64)
+    points = shape.vertices[rows].astype(np.float64) * unit
+    normals = shape.normals[rows]
+    offsets = (points * normals).sum(axis=1)
+    return _Sample(points, normals, offsets, shape.colours[rows], cells_of(points, cell))
 
 
 def _by_cell(
     colours: NDArray[np.uint8], cell: NDArray[np.int64], count: NDArray[np.int64]
 ) -> Array:
     """Means (C, 3) of colours (n, 3) over C cells, about that of all, weighted so that the sum of
-    squares is one over colours."""
+    squares is one over colours; 0 for a cell without any."""
     sums = np.stack([np.bincount(cell, weights=each) for each in colours.T], axis=-1)
-    centred = sums / count[:, None] - colours.mean(axis=0)
+    centred = sums / np.maximum(count, 1)[:, None] - sums.sum(axis=0) / len(colours)
     return np.asarray(centred * np.sqrt(count)[:, None])

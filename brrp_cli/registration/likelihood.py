@@ -28,6 +28,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brrp_cli.config import ColourConfig, LikelihoodConfig
+from brrp_cli.frames.dilate import dilated
 from brrp_cli.frames.frame import Frame
 from brrp_cli.geometry import transform_points
 from brrp_cli.observation.pixel_noise import PixelNoise
@@ -102,20 +103,13 @@ def see(
 
     patch : metres; bleed : radians by which silhouettes are uncertain
     """
-    from scipy.ndimage import binary_dilation
-
     mask = frame.segmap == object_id
     middle = float(np.median(frame.points[mask & frame.valid][:, 2]))
     focal = float(frame.K[0, 0])
     cell = max(2.0, patch * focal / middle)
     stride = max(1, round(cell / config.rays_across_patch))
     blur = max(1, round(bleed * focal))
-    rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
-    beside = np.zeros_like(mask)
-    box = tuple(
-        slice(max(int(each[0]) - blur, 0), int(each[-1]) + blur + 1) for each in (rows, columns)
-    )
-    beside[box] = binary_dilation(mask[box], iterations=blur)
+    beside = dilated(mask, blur)
     part = (slice(None, None, stride), slice(None, None, stride))
     v, u = np.mgrid[: frame.shape[0] : stride, : frame.shape[1] : stride]
     valid = frame.valid[part]

@@ -39,6 +39,10 @@ class ModelGeometry(Protocol):
         """Distance (n,), metres, of points (n, 3) to the surface, negative inside."""
         ...
 
+    def distance(self, points: Floats) -> Floats:
+        """`signed_distance` (n,) at points (3, n), in single precision."""
+        ...
+
     def distance_and_gradient(self, points: Floats) -> tuple[Floats, Floats]:
         """`signed_distance` (n,) and its gradient (3, n), at points (3, n)."""
         ...
@@ -62,6 +66,11 @@ class BareModel:
         field."""
         return self.field.signed_distance(points / self.half_extent) * self.half_extent
 
+    def distance(self, points: Floats) -> Floats:
+        """`signed_distance` (n,) at points (3, n), in single precision."""
+        unit = np.float32(self.half_extent)
+        return self.field.distance(points / unit) * unit
+
     def distance_and_gradient(self, points: Floats) -> tuple[Floats, Floats]:
         """`signed_distance` (n,) and its gradient (3, n), at points (3, n)."""
         unit = np.float32(self.half_extent)
@@ -80,6 +89,10 @@ class Model:
     def signed_distance(self, points: NDArray[np.floating]) -> Array:
         """As that of `BareModel`."""
         return self._bare.signed_distance(points)
+
+    def distance(self, points: Floats) -> Floats:
+        """As that of `BareModel`."""
+        return self._bare.distance(points)
 
     def distance_and_gradient(self, points: Floats) -> tuple[Floats, Floats]:
         """As that of `BareModel`."""

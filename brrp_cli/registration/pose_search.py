@@ -57,7 +57,8 @@ def search(
     seed: int,
     best: float = -np.inf,
 ) -> list[Hypothesis]:
-    """The best placements of one model that differ in shape, best first, `config.kept` at most.
+    """The best placements of one model that differ in shape, best first, `config.kept` at most; of
+    one that cannot win, the best.
 
     best : alignment score that another model has reached
     """
@@ -81,8 +82,8 @@ def search(
     ):
         T, reached = _best(T, model, verifier, config, count)
         if reached < least:
-            return _distinct(_judged(T[: config.fine], model, verifier, config), config)
-        T = _refined(T, model, verifier, points, distance, steps)
+            return _judged(T[:1], model, verifier, config)
+        T = _refined(different(T, config), model, verifier, points, distance, steps)
     found = _judged(T, model, verifier, config)
     found = by_colour(found, verifier, config)
     if found[0].alignment_score < config.settled:
@@ -132,6 +133,7 @@ def by_colour(
         config.fine_distance,
         config.middle_steps,
     )
+    T = different(T, config)
     alike = [
         each
         for each in [best, *_judged(T, model, verifier, config)]
@@ -154,6 +156,21 @@ def by_colour(
 
 def _rotation(placed: Hypothesis) -> Rotation:
     return Rotation.from_matrix(placed.T_cam_model[:3, :3] / placed.scale)
+
+
+def different(T_cam_model: Array, config: SearchConfig) -> Array:
+    """Placements (B, 4, 4), best first, of one size, without those that are all but a better one:
+    more steps would bring both to the same place."""
+    R, t = T_cam_model[:, :3, :3].reshape(-1, 9), T_cam_model[:, :3, 3]
+    # The trace of the turn between two is 1 + 2 cos of its angle.
+    trace = R @ R.T / (R[0] @ R[0] / 3)
+    shift = np.linalg.norm(t[:, None] - t, axis=2)
+    same = (trace > 1 + 2 * np.cos(config.same_turn)) & (shift < config.same_shift)
+    kept = np.ones(len(same), dtype=np.bool_)
+    for row in range(len(same)):
+        if kept[row]:
+            kept[row + 1 :] &= ~same[row, row + 1 :]
+    return T_cam_model[kept]
 
 
 def _distinct(found: list[Hypothesis], config: SearchConfig) -> list[Hypothesis]:

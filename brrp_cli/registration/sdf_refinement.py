@@ -13,8 +13,9 @@ from brrp_cli.registration.model import ModelGeometry
 
 Array = NDArray[np.float64]
 
-# Placements that turn (radians) and move (metres) by less in a step stand still.
-STILL = 2e-5
+# Placements that turn (radians) and move (metres) by less in a step stand still: a tenth of what a
+# depth camera can tell.
+STILL = 1e-4
 # Of the mean diagonal: what is not seen of a ball's turn is not turned.
 DAMPING = 1e-6
 # A step changes the size by this share at most.

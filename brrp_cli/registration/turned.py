@@ -22,7 +22,7 @@ from brrp_cli.registration.colour_pose import (
     textured_agreement,
     turns_about_itself,
 )
-from brrp_cli.registration.pose_search import Hypothesis
+from brrp_cli.registration.pose_search import Hypothesis, different
 from brrp_cli.registration.sdf_refinement import refine_to_sdf
 from brrp_cli.registration.verification import Verifier
 from brrp_cli.seeds import child_rng
@@ -61,7 +61,8 @@ def turned(placed: Hypothesis, verifier: Verifier, patch: float, config: SearchC
     )
     T = np.asarray(np.linalg.inv(refined), dtype=np.float64)
     near = np.minimum(_distances(T, placed, points[: config.fine_points]), turn.far).mean(axis=1)
-    T = T[np.argsort(near, kind="stable")[: turn.judged]]
+    near_enough = np.argsort(near, kind="stable")[: turn.judged]
+    T = different(T[near_enough[near[near_enough] <= near.min() + turn.worse]], config)
     T = np.concatenate([placed.T_cam_model[None], T])
     T = T[_as_much_explained(T, placed, verifier, config)]
     exact = np.minimum(_distances(T, placed, points, exact=True), turn.far)

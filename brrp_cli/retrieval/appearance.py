@@ -18,11 +18,11 @@ from numpy.typing import NDArray
 from brrp_cli.config import Config, HypothesesConfig
 from brrp_cli.config.retrieval import FusionConfig
 from brrp_cli.errors import RetrievalError
-from brrp_cli.frames.frame import BACKGROUND, Frame
-from brrp_cli.observation.ray_samples import box_center
+from brrp_cli.frames.frame import Frame
+from brrp_cli.observation.ray_samples import scene_plane
 from brrp_cli.observation.sensor_noise import wave_deviation
 from brrp_cli.observation.strays import without_strays
-from brrp_cli.observation.support_plane import Plane, fit_plane
+from brrp_cli.observation.support_plane import Plane
 from brrp_cli.prior.store import Prior
 from brrp_cli.retrieval.aligned import Aligner
 from brrp_cli.retrieval.illuminants import lights, local_lights, log_prior
@@ -152,10 +152,4 @@ class AppearanceRetriever:
 
     def plane(self, frame: Frame) -> Plane | None:
         """The support plane of the frame; None where none is found."""
-        config = self._config.observation
-        points = [frame.object_points(i) for i in frame.object_ids]
-        centers = [box_center(p) for p in points if len(p) >= config.min_points]
-        if not centers:
-            return None
-        background = frame.points[frame.valid & (frame.segmap == BACKGROUND)]
-        return fit_plane(background, config, self._seed, np.mean(centers, axis=0))
+        return scene_plane(frame, self._config.observation, self._seed)

@@ -95,7 +95,9 @@ def _stands(
     """Whether a mask reaches down to the table, or something hides its foot or bears it."""
     ndimage = import_library("scipy.ndimage")
     known = mask & np.isfinite(height)
-    if np.percentile(height[known], config.lowest) < config.stands:
+    low, high = np.percentile(height[known], (config.lowest, 100 - config.lowest))
+    # Of what is round, seen from above, the lower half is hidden.
+    if low < np.clip(config.round * high, config.stands, config.round_stands):
         return True
     # At the lower end of the outline: what is next to it, in the image?
     outline = known & ~ndimage.binary_erosion(mask)
@@ -103,7 +105,9 @@ def _stands(
         return True
     foot = outline & (height <= np.percentile(height[outline], config.foot))
     own = float(np.median(depth[foot]))
-    beside = ndimage.binary_dilation(foot, iterations=config.reach) & ~mask & np.isfinite(depth)
+    beside = ndimage.binary_dilation(foot, iterations=config.reach) & ~mask
+    beside &= np.isfinite(depth) | (segmap != 0)
     nearer = depth[beside] < own - config.touch
-    bears = (segmap[beside] != 0) & (np.abs(depth[beside] - own) <= config.touch)
+    # Also where the other mask has no depth, as at its edge.
+    bears = (segmap[beside] != 0) & ~(depth[beside] > own + config.touch)
     return bool((nearer | bears).sum() > config.held * max(int(beside.sum()), 1))

@@ -30,6 +30,7 @@ def test_denormals_of_an_array_are_counted():
     assert count_denormals(np.array(values, np.float64)) == 0
     assert count_denormals(np.array([1e-310, 2.3e-308, -5e-324])) == 2
     assert count_denormals(np.array([1, 2])) == 0
+    assert count_denormals(torch.empty(3, device="meta")) == 0
 
 
 def test_what_is_made_within_an_operation_of_torch_is_seen():

@@ -10,7 +10,7 @@ import trimesh
 from table_scene import T_CAM_WORLD, T_WORLD_CAM, box, in_camera, photograph, placed
 
 from brrp_cli import Reconstructor, open_posterior, open_prior, reconstruct, write_results
-from brrp_cli.config import preset
+from brrp_cli.config import SearchConfig, preset
 from brrp_cli.demo.layout import turn
 from brrp_cli.geometry import similarity, transform_points
 from brrp_cli.ground_truth.surface_metrics import MeshSurface
@@ -77,7 +77,11 @@ def test_the_record_tells_of_evidence_and_weights(result):
         assert item.retrieved[0].name == name
         assert item.retrieved[0].alignment_score > 0.7
         assert item.retrieved[0].weight > 0.9
-        assert item.retrieved[1].alignment_score < item.retrieved[0].alignment_score
+        best, other = item.retrieved
+        # What is improbable beside an explanation is not placed at all.
+        tried = other.probability >= SearchConfig().unlikely * best.probability
+        assert (other.alignment_score is not None) == tried
+        assert not tried or other.alignment_score < best.alignment_score
         weights = [r.weight for r in item.retrieved]
         assert sum(weights) + item.unknown_weight == pytest.approx(1)
         probabilities = [r.probability for r in item.retrieved]
@@ -137,6 +141,28 @@ def test_retrieval_that_is_wrong_is_outweighed_by_what_the_frame_says(folder, tr
     assert [r.name for r in found.retrieved] == ["box", "can"]
     assert weights["can"] > 0.9
     assert iou(found.surface, truth[CAN]) > 0.85
+
+
+class Sure:
+    """The same P(c|R) of every object."""
+
+    name = "sure"
+
+    def __init__(self, shares):
+        self.shares = np.array(shares)
+
+    def probabilities(self, frame, object_id):
+        return self.shares
+
+
+def test_what_is_improbable_beside_an_explanation_is_not_placed(folder, truth):
+    prior = open_prior(folder)
+    sure = Sure([0.9 if name == "can" else 0.04 for name in prior.names])
+    found = reconstruct(photograph({CAN: truth[CAN]}), prior, retriever=sure).objects[0]
+    can, other = found.retrieved
+    assert can.weight > 0.9 and can.alignment_score >= SearchConfig().explained
+    assert other.name == "box" and other.weight == 0 and other.T_cam_object is None
+    assert can.weight + found.unknown_weight == pytest.approx(1)
 
 
 def test_a_map_that_is_nowhere_sure_enough_has_no_surface_but_files(folder, truth, tmp_path):

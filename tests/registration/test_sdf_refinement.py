@@ -58,6 +58,7 @@ def test_slope_and_distance_are_those_of_the_field(field):
     points = np.random.default_rng(1).uniform(-0.1, 0.1, (500, 3))
     distance, slope = field.distance_and_gradient(points.T.astype(np.float32))
     np.testing.assert_allclose(distance, field.signed_distance(points), atol=1e-6)
+    np.testing.assert_allclose(field.distance(points.T.astype(np.float32)), distance, atol=1e-6)
     step = 1e-5
     for axis, unit in enumerate(np.eye(3)):
         ahead, back = (field.signed_distance(points + s * step * unit) for s in (1, -1))

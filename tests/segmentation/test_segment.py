@@ -18,7 +18,7 @@ from brrp_cli.config.segmentation import (
 from brrp_cli.errors import FrameError
 from brrp_cli.frames.build import make_frame
 from brrp_cli.segmentation.fill_concavities import fill_inside
-from brrp_cli.segmentation.left_out import EDGE, left_out
+from brrp_cli.segmentation.left_out import EDGE, IN_THE_AIR, left_out
 from brrp_cli.segmentation.merge_by_colour import same_hue, vivid_hues
 from brrp_cli.segmentation.refine_borders import refine_borders
 from brrp_cli.segmentation.segment import segment
@@ -203,6 +203,30 @@ def test_what_hangs_in_the_air_is_left_out_and_what_stands_on_a_thing_is_not():
     hanging = boxes(things[0], ((0.06, 0.06, 0.06), -0.1, -0.15, 0.12))
     assert segment(hanging).max() == 1
     assert segment(hanging, keep_all=True).max() == 2
+
+
+def test_a_ball_whose_lower_half_is_hidden_stands_and_a_flat_thing_in_the_air_does_not():
+    segmap = np.zeros((60, 80), np.int64)
+    segmap[20:40, 10:30] = 1
+    segmap[20:40, 50:70] = 2
+    depth = np.ones((60, 80))
+    # From above: the upper half of a ball of 9 cm, and a lid at the same height.
+    ball = np.linspace(0.09, 0.048, 20)[:, None]
+    height = np.where(segmap == 1, np.pad(ball, ((20, 20), (0, 0))), 0.0)
+    height = np.where(segmap == 2, 0.062, height)
+    assert left_out(segmap, depth, height, LeftOutConfig()) == {2: IN_THE_AIR}
+
+
+def test_what_lies_on_a_thing_without_depth_at_its_edge_stands():
+    segmap = np.zeros((60, 80), np.int64)
+    segmap[20:30, 20:40] = 1
+    segmap[30:50, 20:40] = 2
+    depth = np.ones((60, 80))
+    height = np.where(segmap == 1, 0.1, np.where(segmap == 2, 0.03, 0.0))
+    depth[30:50, 20:40] = np.nan
+    height[30:50, 20:40] = np.nan
+    assert left_out(segmap, depth, height, LeftOutConfig()) == {}
+    assert left_out(segmap % 2, depth, height, LeftOutConfig()) == {1: IN_THE_AIR}
 
 
 def test_a_mask_that_bled_over_the_table_ends_where_colour_does():

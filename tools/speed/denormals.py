@@ -31,10 +31,13 @@ _BITS = {
 
 
 def count_denormals(values: NDArray[Any] | torch.Tensor) -> int:
-    """How many of an array's numbers are denormal; 0 for any type but float32 and float64.
+    """How many of an array's numbers are denormal; 0 for any type but float32 and float64, and for
+    a tensor that has no numbers yet (device "meta").
 
     Read from the bits: a thread that flushes denormals takes them for 0 when it compares.
     """
+    if isinstance(values, torch.Tensor) and values.is_meta:
+        return 0
     array = values.detach().cpu().numpy() if isinstance(values, torch.Tensor) else values
     if array.dtype not in _BITS:
         return 0

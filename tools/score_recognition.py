@@ -1,0 +1,233 @@
+"""Which stored objects are recognised with masks made from depth, and what became of the others?
+
+    python tools/score_recognition.py SCENES... --prior PRIOR --data-root DATA [-o rows.jsonl]
+
+For each set of scenes (published layout, as tools/make_scenes.py writes it), over the true objects
+that the prior holds, of which the first view has 1,000 pixels of depth or more and which the
+image's border does not cut: how many are recognised after masks were mended, by what the mask was
+before that. --truth takes the true masks instead.
+
+own      a mask of its own, IoU over 0.75
+shared   its mask holds another object, too: a quarter of the mask, or 40 % of that object
+pieces   two masks or more hold mostly it, each a tenth of it
+table    a quarter of its mask is table or what lies behind
+part     less than 70 % of it has a mask
+rough    its own for the rest, IoU 0.75 or less
+missing  no mask holds 30 % of it
+
+`wrong` counts masks that were taken for a stored object, weight over 0.5, that most of the mask is
+not; `pixels` of such masks are in the rows. `mm` is the mean distance of placed models, where
+they are recognised, from the true surface.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+import time
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+# The script also runs from a checkout that is not installed.
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+from brrp_cli.config.segmentation import SegmentConfig
+from brrp_cli.dependencies import import_open3d
+from brrp_cli.errors import BrrpError
+from brrp_cli.frames.frame import Frame
+from brrp_cli.geometry import transform_points
+from brrp_cli.ground_truth.scenes import Scene, find_scenes, true_mesh_in_camera
+from brrp_cli.prior.store import Prior, open_prior
+from brrp_cli.raycast import raycasting_scene
+from brrp_cli.reconstruction import ObjectReconstruction, Reconstruction, Retrieved
+from brrp_cli.segmentation.left_out import border_share
+from brrp_cli.segmentation.segment import segment
+from brrp_cli.session import Reconstructor
+
+CAUSES = ("own", "shared", "pieces", "table", "part", "rough", "missing")
+
+Row = dict[str, Any]
+
+
+def cause(truth: np.ndarray, masks: np.ndarray, object_id: int) -> tuple[str, list[int]]:
+    """What became of one object's mask, and the objects with which it shares one.
+
+    truth, masks : (n,) ids of the same pixels, 0 = background
+    """
+    own = truth == object_id
+    ids, counts = np.unique(masks[own & (masks != 0)], return_counts=True)
+    if not len(ids) or counts.max() < 0.3 * own.sum():
+        pieces = [i for i in ids if _holds_mostly(truth, masks == i, object_id)]
+        return ("pieces" if len(pieces) > 1 else "missing"), []
+    mask = masks == ids[np.argmax(counts)]
+    if (mask & own).sum() > 0.75 * (mask | own).sum():
+        return "own", []
+    sharing = [
+        int(other)
+        for other in np.unique(truth[mask])
+        if other not in (0, object_id)
+        and (part := (truth[mask] == other).sum())
+        > min(0.25 * mask.sum(), 0.4 * (truth == other).sum())
+        and part > 0.05 * mask.sum()
+    ]
+    if sharing:
+        return "shared", sharing
+    pieces = [
+        i
+        for i, count in zip(ids, counts, strict=True)
+        if count > 0.1 * own.sum() and _holds_mostly(truth, masks == i, object_id)
+    ]
+    if len(pieces) > 1:
+        return "pieces", []
+    if (truth[mask] == 0).sum() > 0.25 * mask.sum():
+        return "table", []
+    if (own & (masks != 0)).sum() < 0.7 * own.sum():
+        return "part", []
+    return "rough", []
+
+
+def _holds_mostly(truth: np.ndarray, mask: np.ndarray, object_id: int) -> bool:
+    return bool((truth[mask] == object_id).sum() > 0.5 * mask.sum())
+
+
+def rows_of(
+    scene: Scene, again: Reconstructor, prior: Prior, data_root: Path, given: bool, least: int
+) -> list[Row]:
+    """A row for each object that the prior holds, and one for each mask taken for another."""
+    frame = scene.view(0)
+    start = time.perf_counter()
+    masks = frame.segmap if given else segment(frame)
+    seconds = time.perf_counter() - start
+    unmasked = replace(frame, segmap=np.zeros_like(frame.segmap))
+    result = again(frame if given else unmasked)
+    told = {item.object_id: _mostly(item, result, frame) for item in result.objects}
+    rows: list[Row] = []
+    for object_id in frame.object_ids:
+        name = scene.object(object_id).name
+        mine = frame.segmap == object_id
+        cut = border_share(mine) > SegmentConfig().left_out.cut
+        if name not in prior.names or cut or (mine & frame.valid).sum() < least:
+            continue
+        why, others = cause(frame.segmap[frame.valid], masks[frame.valid], object_id)
+        found = [
+            item.recognised
+            for item in result.objects
+            if item.recognised is not None
+            and item.recognised.name == name
+            and told[item.object_id] == object_id
+        ]
+        rows.append(
+            {
+                "scene": scene.name,
+                "object": name,
+                "pixels": int((mine & frame.valid).sum()),
+                "cause": why,
+                "shared_with": [scene.object(i).name for i in others],
+                "recognised": bool(found),
+                "distance": _distance(found[0], scene, object_id, prior, data_root, frame)
+                if found
+                else None,
+                "seconds": seconds,
+            }
+        )
+    for item in result.objects:
+        if (taken := item.recognised) is None:
+            continue
+        true_id = told[item.object_id]
+        true_name = scene.object(true_id).name if true_id else "nothing"
+        if taken.name != true_name:
+            rows.append(
+                {
+                    "scene": scene.name,
+                    "wrong": taken.name,
+                    "weight": taken.weight,
+                    "is": true_name,
+                    "stored": true_name in prior.names,
+                    "pixels": int((result.frame.segmap == item.object_id).sum()),
+                }
+            )
+    rows.append({"scene": scene.name, "masks": len(result.objects)})
+    return rows
+
+
+def _mostly(item: ObjectReconstruction, result: Reconstruction, frame: Frame) -> int:
+    """The true object of most of a mask; 0 = none."""
+    mine = frame.segmap[(result.frame.segmap == item.object_id) & frame.valid]
+    return int(np.bincount(np.maximum(mine, 0)).argmax()) if len(mine) else 0
+
+
+def _distance(
+    found: Retrieved, scene: Scene, object_id: int, prior: Prior, data_root: Path, frame: Frame
+) -> float:
+    """Mean distance, metres, of the placed model's vertices from the true surface."""
+    assert frame.T_world_cam is not None
+    assert found.T_cam_object is not None
+    mesh = true_mesh_in_camera(scene.object(object_id), data_root, frame.T_world_cam).copy()
+    center = mesh.bounds.mean(axis=0)
+    mesh.apply_translation(-center)
+    vertices = prior.load(found.name).shape.vertices.astype(np.float64)
+    drawn = vertices[np.random.default_rng(0).permutation(len(vertices))[:2000]]
+    placed = transform_points(found.T_cam_object, drawn) - center
+    query = import_open3d().core.Tensor(placed.astype(np.float32))
+    return float(raycasting_scene([mesh]).compute_distance(query).numpy().mean())
+
+
+def report(name: str, rows: list[Row]) -> str:
+    """Lines of one set: all, and by cause."""
+    objects = [row for row in rows if "object" in row]
+    wrong = [row for row in rows if "wrong" in row]
+    masks = sum(row["masks"] for row in rows if "masks" in row)
+    found = [row for row in objects if row["recognised"]]
+    near = 1000 * np.mean([row["distance"] for row in found]) if found else np.nan
+    lines = [
+        f"{name}: {len(found)} of {len(objects)} recognised"
+        f" ({100 * len(found) / max(len(objects), 1):.0f} %), {near:.1f} mm;"
+        f" {len(wrong)} of {masks} masks wrong"
+    ]
+    for why in CAUSES:
+        those = [row for row in objects if row["cause"] == why]
+        if those:
+            lines.append(
+                f"  {why:8} {len(those):4}, recognised {sum(r['recognised'] for r in those):4}"
+            )
+    return "\n".join(lines)
+
+
+def main() -> None:
+    """Score every set that is named."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("scenes", type=Path, nargs="+")
+    parser.add_argument("--prior", type=Path, required=True)
+    parser.add_argument("--data-root", type=Path, required=True)
+    parser.add_argument("--truth", action="store_true", help="True masks in place of made ones.")
+    parser.add_argument(
+        "--least", type=int, default=1000, help="Pixels of depth that an object has."
+    )
+    parser.add_argument("-o", "--output", type=Path, help="All rows, as lines of JSON.")
+    arguments = parser.parse_args()
+    prior = open_prior(arguments.prior)
+    again = Reconstructor(prior, retriever="appearance", workers=1)
+    every: list[Row] = []
+    for folder in arguments.scenes:
+        rows: list[Row] = []
+        for scene in find_scenes(folder):
+            try:
+                rows += rows_of(
+                    scene, again, prior, arguments.data_root, arguments.truth, arguments.least
+                )
+            except BrrpError as error:
+                print(f"{scene.name}: {error}", file=sys.stderr)
+        print(report(folder.name, rows), flush=True)
+        every += [{"set": folder.name, **row} for row in rows]
+    if len(arguments.scenes) > 1:
+        print(report("all", every))
+    if arguments.output is not None:
+        arguments.output.write_text("".join(json.dumps(row) + "\n" for row in every))
+
+
+if __name__ == "__main__":
+    main()
