@@ -10,7 +10,6 @@ from scipy.spatial.transform import Rotation
 from test_around_mesh import region, shape_of
 
 from brrp_cli.config import SurfaceConfig
-from brrp_cli.raycast import inside
 from brrp_cli.surface.alike import every_alike
 from brrp_cli.surface.around_mesh import out_to_reach
 
@@ -77,5 +76,3 @@ def test_a_surface_of_a_coarse_grid_is_moved_out_to_its_reach():
     assert after.min() > 0.0009 and np.mean(after > 0.00099) > 0.999
     stay = distance > 0.001
     assert moved[stay] == pytest.approx(found.vertices[stay], abs=1e-9)
-    found.vertices = moved
-    assert inside(found, shape.vertices[::10]).all()
