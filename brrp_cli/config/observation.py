@@ -74,7 +74,7 @@ class SensorConfig:
     noise: float = 0.0012
     noise_growth: float = 0.0015
     wave: float = 0.0005
-    bias: float = 0.00035
+    bias: float = 0.0003
     patch: float = 0.01
     table_reach: float = 0.015
     least_patches: int = 30

@@ -21,6 +21,9 @@ class SurfaceConfig:
     spacing is `around_finest` metres at least
     fidelity : metres, standard deviation of a stored mesh from its object; band_draws : of the
     pose, from which the width of the band around it follows, looked at in `band_vertices` vertices
+    Placements that are as probable as the best one are turned by steps of `turn_step` radians:
+    between neighbours that are turned by `neighbours` radians at most, and all around an axis that
+    `free_turns` of them share, where any two are such neighbours
     keep_distance : metres; a component of the level set further from every observed point is
     hallucinated
     one_piece : whether an object is one piece; the published methods keep every part near what was
@@ -55,4 +58,7 @@ class SurfaceConfig:
     band_vertices: int = 300
     around_nodes: int = 1_000_000
     around_finest: float = 0.001
+    free_turns: int = 3
+    neighbours: float = 1.0
+    turn_step: float = 0.25
     most_off: float = share(0.05)

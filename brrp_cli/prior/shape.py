@@ -96,7 +96,7 @@ class StoredShape:
             # Further from the surface than the field can be off, its sign is right.
             unsure = np.abs(distance[near]) < OFF * self.field.spacing
             inside = distance[near] < 0
-            inside[unsure] = self._inside(points[near[unsure]])
+            inside[unsure] = self.inside(points[near[unsure]])
             distance[near] = np.where(inside, -exact, exact)
         return distance
 
@@ -110,17 +110,25 @@ class StoredShape:
     ) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
         """Exact distance (n,) of points (n, 3), negative inside, and the nearest face (n,)."""
         distance, face = self._nearest(points)
-        return np.where(self._inside(points), -distance, distance), face
+        return np.where(self.inside(points), -distance, distance), face
+
+    def closest(
+        self, points: NDArray[np.floating]
+    ) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+        """The point of the surface (n, 3) that is nearest to each of points (n, 3), and its face
+        (n,)."""
+        closest = self.scene.compute_closest_points(_tensor(points), nthreads=1)
+        face = closest["primitive_ids"].numpy().astype(np.int64)
+        return closest["points"].numpy().astype(np.float64), face
 
     def _nearest(
         self, points: NDArray[np.floating]
     ) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-        """The same without a sign."""
-        closest = self.scene.compute_closest_points(_tensor(points), nthreads=1)
-        apart = closest["points"].numpy().astype(np.float64) - points
-        return np.linalg.norm(apart, axis=1), closest["primitive_ids"].numpy().astype(np.int64)
+        """`nearest` without a sign."""
+        closest, face = self.closest(points)
+        return np.linalg.norm(closest - points, axis=1), face
 
-    def _inside(self, points: NDArray[np.floating]) -> NDArray[np.bool_]:
+    def inside(self, points: NDArray[np.floating]) -> NDArray[np.bool_]:
         """Which of points (n, 3) lie inside."""
         occupied = self.scene.compute_occupancy(_tensor(points), nthreads=1, nsamples=RAYS)
         return np.asarray(occupied.numpy() > 0.5)

@@ -13,8 +13,12 @@ from brrp_cli.config import SurfaceConfig
 from brrp_cli.geometry import transform_points
 from brrp_cli.inference.placed_shape import PlacedShape
 from brrp_cli.reconstruction import Axes
+from brrp_cli.surface.alike import every_alike
 
 Array = NDArray[np.float64]
+
+# Metres; nearer to a surface single precision does not tell which way leads away from it.
+_CLEAR = 5e-5
 
 
 def around_axes(shape: PlacedShape, reach: float, config: SurfaceConfig) -> Axes:
@@ -50,11 +54,35 @@ def beyond_reach(shape: PlacedShape, reach: Array, axes: Axes, further: float) -
     return np.asarray(beyond.reshape([len(axis) for axis in axes]))
 
 
-def reach_of_alike(shape: PlacedShape) -> Array:
-    """(n,) metres by which the placements that are as probable (`alike`) go beyond each vertex."""
+def out_to_reach(shape: PlacedShape, vertices: Array, reach: Array) -> Array:
+    """Vertices (m, 3), metres, camera frame, of a surface around the shape, moved away from it as
+    far as `reach` says; those that are further out stay.
+
+    Between two nodes the distance from a thin wall is not linear, and marching cubes leave their
+    surface inside of where it should be.
+    reach : (n,) metres, as in `beyond_reach`
+    """
+    local = transform_points(np.linalg.inv(shape.T_cam_shape), vertices)
+    closest, face = shape.shape.closest(local)
+    away = local - closest
+    distance = np.linalg.norm(away, axis=1)
+    wanted = reach[shape.shape.faces[face]].max(axis=1) / shape.unit
+    short = np.flatnonzero(distance < wanted)
+    outwards = np.where(shape.shape.inside(local[short]), -1.0, 1.0)
+    clear = distance[short] > _CLEAR / shape.unit
+    a, b, c = (shape.shape.vertices[corner] for corner in shape.shape.faces[face[short]].T)
+    normal = np.cross(b - a, c - a)
+    way = np.where(clear[:, None], outwards[:, None] * away[short], normal)
+    way /= np.maximum(np.linalg.norm(way, axis=1, keepdims=True), 1e-12)
+    local[short] = closest[short] + wanted[short, None] * way
+    return np.asarray(transform_points(shape.T_cam_shape, local))
+
+
+def reach_of_alike(shape: PlacedShape, config: SurfaceConfig) -> Array:
+    """(n,) metres by which the placements that are as probable go beyond each vertex."""
     reach = np.zeros(len(shape.shape.vertices))
     T_shape_cam = np.linalg.inv(shape.T_cam_shape)
-    for T in shape.alike:
+    for T in every_alike(shape, config):
         vertices = transform_points(T_shape_cam @ T, shape.shape.vertices.astype(np.float64))
         distance, face = shape.shape.nearest(vertices)
         out = np.maximum(distance, 0.0) * shape.unit

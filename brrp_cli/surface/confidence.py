@@ -45,6 +45,7 @@ from brrp_cli.surface.around_mesh import (
     around_axes,
     beyond_reach,
     marching_cubes_of,
+    out_to_reach,
     reach_of_alike,
 )
 from brrp_cli.surface.extract import grid_axes, level_set
@@ -154,7 +155,8 @@ def _around_stored_mesh(
     moved = np.einsum("ni,ni->n", best.vertices - through.vertices, through.normals)
     # Where a vertex is a corner, its faces move by less than itself.
     corners = band * shape.shape.corners
-    reach = moved + corners + reach_of_alike(shape)
+    # Both the placed mesh and the written one lie inside.
+    reach = np.maximum(moved, 0.0) + corners + reach_of_alike(shape, config)
     axes = around_axes(shape, float(reach.max()) + margin, config)
     beyond = beyond_reach(shape, reach, axes, margin)
     if margin > 0:
@@ -167,8 +169,9 @@ def _around_stored_mesh(
             return None
         occupied = posterior.probability_volume(axes) / min(level, config.level) - 1
         inside = np.maximum(inside, occupied * (axes[0][1] - axes[0][0]))
-    found = marching_cubes_of(inside, axes)
-    return ConfidenceSurface(*found, confidence, 1 - confidence, bounded=True)
+    vertices, faces = marching_cubes_of(inside, axes)
+    vertices = out_to_reach(shape, vertices, reach)
+    return ConfidenceSurface(vertices, faces, confidence, 1 - confidence, bounded=True)
 
 
 def simultaneous(shape: PlacedShape, confidence: float, config: SurfaceConfig) -> float:

@@ -225,8 +225,8 @@ def test_a_turn_that_is_as_probable_lies_inside():
     turn[:3, :3] = trimesh.transformations.rotation_matrix(np.radians(20), [0, 0, 1])[:3, :3]
     alone = placed_box(1e-8 * np.eye(6))
     both = replace(alone, alike=(turn @ alone.T_cam_shape)[None])
-    reach = reach_of_alike(both)
-    assert reach_of_alike(alone).max() == 0
+    reach = reach_of_alike(both, CONFIG)
+    assert reach_of_alike(alone, CONFIG).max() == 0
     # A corner of the turned box lies beyond the side by as much as it turned out.
     corner = 0.03 * np.cos(np.radians(20)) + 0.04 * np.sin(np.radians(20)) - 0.03
     assert reach.max() == pytest.approx(corner, rel=0.05)
