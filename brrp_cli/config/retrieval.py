@@ -89,9 +89,9 @@ class AlignmentConfig:
 
     from_objects : size of the prior from which on they are. Fewer objects are told apart without
         it, `likeness` in place of `fusion`, and real depth lowers the scores of the right one too
-    tried : objects that are laid over what is seen, the most probable by their likenesses; margin :
-        nats by which theirs may be less than the best one's; first : weight, in nats, of the score
-        that they reach before any is refined
+    tried : objects that are laid over what is seen, the most probable by their likenesses, so many
+        of those with colours and of those without; margin : nats by which theirs may be less than
+        the best one's; first : weight, in nats, of the score that they reach before any is refined
     most : objects whose placements are refined, the best by likenesses and first score; where none
         of them reaches the score `enough`, so are the next `more`
     least_points : of the object that have to be seen
@@ -156,8 +156,9 @@ class FusionConfig:
 class ShortlistConfig:
     """Which objects of a large prior are looked at closely.
 
-    closely : so many, and all of a prior of that size or less; roughly : so many are kept by colour
-    and shape, of which `closely` are kept by size too; light_step : of every so many-th light
+    closely : so many of those with colours and of those without, and all of a prior of that size or
+    less; roughly : so many are kept by colour and shape, of which `closely` are kept by size too;
+    light_step : of every so many-th light
     """
 
     closely: int = 256

@@ -28,7 +28,7 @@ from brrp_cli.retrieval.aligned import Aligner
 from brrp_cli.retrieval.illuminants import lights, local_lights, log_prior
 from brrp_cli.retrieval.observed_appearance import see_object
 from brrp_cli.retrieval.score_fusion import Similarity, believe
-from brrp_cli.retrieval.shortlist import Shortlist
+from brrp_cli.retrieval.shortlist import Shortlist, best_of_each
 from brrp_cli.retrieval.similarity import lit_histograms, similarity
 
 
@@ -119,12 +119,16 @@ class AppearanceRetriever:
         own = self._config.retrieval.alignment
         if len(points) < own.least_points:
             return replace(look, alignment=own.neutral)
-        order = np.argsort(-likely, kind="stable")
-        order = order[likely[order] > likely[order[0]] * np.exp(-own.margin)][: own.tried]
+        enough = likely > likely.max() * np.exp(-own.margin)
+
+        def most_alike(kind: NDArray[np.int64]) -> NDArray[np.int64]:
+            order = kind[np.argsort(-likely[kind], kind="stable")]
+            return order[enough[order]][: own.tried]
+
+        # In the prior's order, in which shards hold them.
+        tried = best_of_each(self._shortlist.plain[look.rows], most_alike)
         shuffled = points[np.random.default_rng(self._seed).permutation(len(points))]
         seen = self._aligner.on(shuffled, frame, plane, wave)
-        # In the prior's order, in which shards hold them.
-        tried = np.sort(order)
         first = seen.first_scores(self._named(look.rows[tried]))
         promise = np.log(likely[tried]) + own.first * first
         order = tried[np.argsort(-promise, kind="stable")]

@@ -1,6 +1,12 @@
-"""Which objects of a large prior are looked at closely: one product with a mean of each."""
+"""Which objects of a large prior are looked at closely: one product with a mean of each.
+
+Objects with and without colours are chosen apart from each other: a colour in light that is not
+known is never quite alike, and many meshes without colours would crowd out the right one.
+"""
 
 from __future__ import annotations
+
+from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +26,7 @@ class Shortlist:
         self._config = config
         self._first = first
         self._all = np.arange(len(first.colour))
-        self._plain = ~first.colour.any(axis=1)
+        self.plain = ~first.colour.any(axis=1)
 
     def rows(self, seen: SeenObject, histograms: NDArray[np.floating] | None) -> NDArray[np.int64]:
         """Rows (m,) of the table that are to be looked at, ascending."""
@@ -32,16 +38,34 @@ class Shortlist:
         if histograms is not None:
             lit = np.sqrt(histograms[:: own.light_step], dtype=np.float32)
             colour = _best_alike(self._first.colour, lit)
-            colour[self._plain] = neutral
+            colour[self.plain] = neutral
             score += np.float32(weights.colour) * colour
         if seen.pairs is not None:
             pairs = _best_alike(self._first.pairs, np.sqrt(seen.pairs, dtype=np.float32)[None])
             score += np.float32(weights.pairs * (1 - seen.hidden)) * pairs
-        rough = _best(score, own.roughly)
+        return best_of_each(self.plain, lambda kind: self._best_rows(seen, score, kind))
+
+    def _best_rows(
+        self, seen: SeenObject, score: NDArray[np.float32], kind: NDArray[np.int64]
+    ) -> NDArray[np.int64]:
+        """Those of the rows `kind` that are to be looked at, by scores (n,) without size."""
+        own = self._config.shortlist
+        rough = kind[_best(score[kind], own.roughly)]
         sizes = self._first.sizes[rough]
         against = size_penalty(seen.size, sizes, seen.hidden, self._config.similarity)
-        size = np.float32(weights.size) * against
-        return np.sort(rough[_best(score[rough] + size, own.closely)])
+        size = np.float32(self._config.likeness.size) * against
+        return rough[_best(score[rough] + size, own.closely)]
+
+
+def best_of_each(
+    plain: NDArray[np.bool_], best: Callable[[NDArray[np.int64]], NDArray[np.int64]]
+) -> NDArray[np.int64]:
+    """What `best` takes of the objects without colours and of the others, ascending.
+
+    plain : (n,) which objects have no colours; best : from some of 0 to n - 1, the best of them
+    """
+    kinds = (np.flatnonzero(plain), np.flatnonzero(~plain))
+    return np.sort(np.concatenate([best(kind) for kind in kinds if len(kind)]))
 
 
 def _best(score: NDArray[np.float32], count: int) -> NDArray[np.int64]:

@@ -14,7 +14,7 @@ from brrp_cli.descriptors.descriptor import to_bytes
 from brrp_cli.descriptors.point_pairs import PAIR_BINS
 from brrp_cli.prior.appearance_index import first_look
 from brrp_cli.retrieval.observed_appearance import SeenObject
-from brrp_cli.retrieval.shortlist import Shortlist
+from brrp_cli.retrieval.shortlist import Shortlist, best_of_each
 from brrp_cli.retrieval.similarity import (
     blurred,
     colour_likeness,
@@ -94,9 +94,9 @@ def test_objects_without_colours_are_neither_preferred_nor_refused():
     np.testing.assert_allclose(colour_likeness(None, stored, 4, LIKE), LIKE.neutral_colour)
 
 
-def test_a_shortlist_of_a_large_prior_holds_the_true_object():
-    rng = np.random.default_rng(3)
-    count, views = 3_000, 4
+def many_objects(count, rng):
+    """A table of descriptors, and the colours (count, 1, b) and pairs (count, 1, b) in it."""
+    views = 4
     row = np.dtype(
         [
             ("colour", "u1", (views, COLOUR_BINS)),
@@ -110,6 +110,11 @@ def test_a_shortlist_of_a_large_prior_holds_the_true_object():
     table["colour"] = to_bytes(colour * np.ones((views, 1)))
     table["pairs"] = to_bytes(pairs * np.ones((views, 1)))
     table["sizes"] = rng.uniform(0.02, 0.3, (count, 2, 3))
+    return table, colour, pairs
+
+
+def test_a_shortlist_of_a_large_prior_holds_the_true_object():
+    table, colour, pairs = many_objects(3_000, np.random.default_rng(3))
     shortlist = Shortlist(first_look(table), RetrievalConfig())
     for true in (7, 1234, 2999):
         size = table["sizes"][true, 0].astype(float)
@@ -124,3 +129,34 @@ def test_a_shortlist_of_a_large_prior_holds_the_true_object():
             and (np.diff(rows) > 0).all()
         )
         assert float(pair_likeness(seen.pairs, table["pairs"][[true]], LIKE)[0]) > 0.98
+
+
+def test_objects_without_colours_do_not_crowd_out_the_others():
+    table, colour, pairs = many_objects(3_000, np.random.default_rng(4))
+    # All have the true object's shape and size, and no colours.
+    true = 41
+    for name in ("pairs", "sizes"):
+        table[name] = table[name][true]
+    table["colour"][:2_700] = 0
+    table["colour"][true] = to_bytes(colour[true])
+    seen = SeenObject(
+        None,
+        None,
+        pairs[true, 0].astype(np.float32),
+        table["sizes"][true, 0].astype(float),
+        np.zeros((0, 3)),
+        0.0,
+    )
+    # In light that was not tried it is less alike than those without colours are taken to be.
+    off = 0.7 * colour[true] + 0.3 * colour[(true + 1) % 50]
+    rows = Shortlist(first_look(table), RetrievalConfig()).rows(
+        seen, np.repeat(off, 9, axis=0).astype(np.float32)
+    )
+    assert true in rows and (np.diff(rows) > 0).all()
+    assert (rows < 2_700).sum() == RetrievalConfig().shortlist.closely + 1
+
+
+def test_the_best_of_each_kind_are_taken():
+    plain = np.array([True, False, True, False, False])
+    np.testing.assert_array_equal(best_of_each(plain, lambda kind: kind[-1:]), [2, 4])
+    np.testing.assert_array_equal(best_of_each(plain[:1], lambda kind: kind), [0])
