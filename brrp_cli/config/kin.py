@@ -119,6 +119,16 @@ class KinConfig:
     stretch_deviation: float = 0.25
     taper_deviation: float = 0.15
     lift_deviation: float = 0.004
+    bend_steps: int = 10
+    bend_points: int = 1500
+    bend_damping: float = 0.02
+    bend_beyond: float = 0.006
+    bend_round: float = 0.2
+    bend_even: float = 0.08
+    bend_any: float = 0.03
+    bend_lean: float = 0.1
+    bend_steepest: float = share(0.6)
+    out_pull: float = 5.0
     near: float = 0.002
     far: float = 0.015
     violation_weight: float = 3.0
@@ -148,4 +158,4 @@ class KinConfig:
     sure: float = share(0.95)
     exact: float = 0.002
     margin: float = 0.015
-    field_nodes: int = 60_000
+    field_nodes: int = 24_000
