@@ -110,4 +110,4 @@ def leaning(half: NDArray[np.floating]) -> tuple[Mode, ...]:
 
 def row(powers: tuple[int, ...] | NDArray[np.int64]) -> int:
     """Which term has these powers."""
-    return int(np.flatnonzero((POWERS == np.asarray(powers)).all(axis=1))[0])
+    return int(np.flatnonzero((np.asarray(powers) == POWERS).all(axis=1))[0])

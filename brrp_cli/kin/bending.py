@@ -44,7 +44,7 @@ class BentFit:
         return (v * self._sizes(v)) @ self._turned.T + self.middle
 
     def normals(self, u: Array, stored: Array) -> Array:
-        """(n, 3) unit, frame of the plane, where the stored shape has the normals (n, 3) along u."""
+        """(n, 3) unit, frame of the plane, where the stored shape's normals along u are (n, 3)."""
         v = u + bend.terms(u) @ self.bend.T
         A = np.eye(3) + np.einsum("ak,nkj->naj", self.bend, bend.slopes(u))
         A = A * self._sizes(v)[:, :, None]
@@ -117,7 +117,8 @@ def bent(
     damping = config.bend_damping
     for _ in range(config.bend_steps):
         held = H + damping * np.diag(np.diag(H)) + LEAST * np.eye(UNKNOWNS)
-        tried = fit.stepped(-np.linalg.solve(held, g), config)
+        step = -np.asarray(np.linalg.solve(held, g), dtype=np.float64)
+        tried = fit.stepped(step, config)
         found = _system(tried, surface, normals, evidence, precision, config)
         if found[0] < cost:
             fit, (cost, H, g), damping = tried, found, damping / 4

@@ -25,7 +25,7 @@ def ways_out(points: Array, evidence: Evidence, config: KinConfig) -> tuple[Arra
     amount, way = np.zeros(len(points)), np.zeros((len(points), 3))
     under = np.flatnonzero(points[:, 2] < -config.tolerance)
     amount[under], way[under] = -points[under, 2] - config.tolerance, [0, 0, 1]
-    seen = transform_points(T_cam_plane, points)
+    seen: Array = np.asarray(transform_points(T_cam_plane, points), dtype=np.float64)
     free = np.flatnonzero(_gap(seen, evidence) > config.tolerance)
     if len(free):
         back, aside = _back(seen[free], evidence), _aside(seen[free], evidence)

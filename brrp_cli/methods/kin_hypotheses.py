@@ -80,14 +80,13 @@ def kin_hypotheses(
         )
         for row, name in zip(chosen, names, strict=True)
     ]
-    # Which of them fits best shows once they are bent.
-    relative = softmax([-kin.sharpness * each.cost for each in found])
-    relative = np.where(relative >= kin.least_share, relative, 0)
-    relative *= shares[shares >= kin.least_share].sum() / relative.sum()
+    cost = np.array([each.cost for each in found])
+    together = shares[shares >= kin.least_share].sum()
+    relative = bent_shares(cost, library.hollow[fits.placements.stance[chosen]], into, kin)
     return [
         _hypothesis(name, int(row), each, float(share), fits, evidence, library, config)
-        for name, row, each, share in zip(names, chosen, found, relative, strict=True)
-        if share
+        for name, row, each, share in zip(names, chosen, found, together * relative, strict=True)
+        if share >= kin.least_share
     ]
 
 
@@ -116,6 +115,24 @@ def kin_shares(
     together *= config.solid_most + (1 - config.solid_most) * walls
     together *= min(1.0, seen / config.many_seen)
     relative = np.exp(config.sharpness * (score.astype(np.float64) - float(score[0])))
+    return np.asarray(together * relative / relative.sum())
+
+
+def bent_shares(
+    cost: NDArray[np.floating], hollow: NDArray[np.floating], into: float, config: KinConfig
+) -> Array:
+    """Shares (k,) of what `kin_shares` gives them all, of fits with these costs (k,) once bent.
+
+    hollow, into : as in `kin_shares`; a solid has to fit best, since the completion is good at
+    solids, and a hollow thing that the camera looks into least
+    """
+    best = int(np.argmin(cost))
+    walls = float(_walls(hollow[[best]], config)[0])
+    closed, wall, opened = np.log(config.most_cost)
+    most = closed + walls * (np.interp(into, config.opening, [wall, opened]) - closed)
+    together = expit(config.cost_sharpness * (most - np.log(cost[best])))
+    relative = softmax(-config.sharpness * cost)
+    relative = np.where(relative >= config.least_share, relative, 0)
     return np.asarray(together * relative / relative.sum())
 
 
