@@ -50,6 +50,14 @@ class KinConfig:
     the share of the surface that stands in free space or below the plane, from `tolerance` metres
     on and fully from `tolerance + slope`; `free_weight` : of free points within; `lost_weight` : of
     observed points further than `lost` metres away. All points move the best `kept` fits once more.
+    Bends (kin/bend.py, kin/bending.py): the hypotheses take `bend_steps` damped steps (a share
+    `bend_damping` at first), over a cubic bend too, with `bend_points` points of their surface. A
+    seen point pulls at the nearest of those that face the camera, along its normal, or straight
+    where it lies beyond its edge by `bend_beyond` metres. The surface is pushed out of free space,
+    beyond `tolerance`, with `out_pull` in place of `free_pull`. Coefficients have standard
+    deviations, in halves of the box: `bend_round` where what is round stays round, `bend_even`
+    where two sides that are alike stay alike, `bend_any` of all others; `bend_lean` : radians;
+    `bend_steepest` : of the bend's slopes, so that space does not fold.
     Hypotheses: of the best `kept` fits the best `hypotheses` that lie `distinct` metres apart, at
     every `distinct_step`-th point. Their weight is a logistic function of the best score, a half at
     `convincing`, with the slope `sharpness`. Of a hollow shape, whose share of hollow space reaches
@@ -57,9 +65,12 @@ class KinConfig:
     to `opening_bonus` lower where the camera looks into the object: where a share `opening_share`
     of what was seen reaches from the first to the second of `opening`, over its longest extent,
     behind the near side of its convex hull. A solid shape weighs `solid_most` at most: of solids
-    the completion is as good, and their mean is better than either. All weigh less where fewer
-    than `many_seen` cells were seen, nothing below `least_seen`; what weighs less than
-    `least_share` is left out.
+    the completion is as good, and their mean is better than either. Once bent, they keep that
+    weight where the best one costs little, half of it at `most_cost` (of a solid, of a hollow
+    shape, and of one that the camera looks into), with the slope `cost_sharpness` over the cost's
+    logarithm, and share it by `sharpness` times their costs. All weigh less where fewer than
+    `many_seen` cells were seen, nothing below `least_seen`; what weighs less than `least_share` is
+    left out.
     The logit is the distance over `width` metres,
     which grows by `doubt` for each unit that the mean Gaussian falls short of `sure`, and of hollow
     shapes is exact to `exact` metres; distances are kept on `field_nodes` nodes up to `margin`
@@ -119,6 +130,16 @@ class KinConfig:
     stretch_deviation: float = 0.25
     taper_deviation: float = 0.15
     lift_deviation: float = 0.004
+    bend_steps: int = 10
+    bend_points: int = 1500
+    bend_damping: float = 0.02
+    bend_beyond: float = 0.006
+    bend_round: float = 0.2
+    bend_even: float = 0.08
+    bend_any: float = 0.03
+    bend_lean: float = 0.1
+    bend_steepest: float = share(0.6)
+    out_pull: float = 5.0
     near: float = 0.002
     far: float = 0.015
     violation_weight: float = 3.0
@@ -140,6 +161,8 @@ class KinConfig:
     opening: tuple[float, float] = (0.15, 0.19)
     opening_bonus: float = 0.7
     solid_most: float = share(0.45)
+    most_cost: tuple[float, float, float] = (0.2, 0.45, 2.0)
+    cost_sharpness: float = 8.0
     many_seen: int = 250
     least_seen: int = 40
     least_share: float = share(0.15)
@@ -148,4 +171,4 @@ class KinConfig:
     sure: float = share(0.95)
     exact: float = 0.002
     margin: float = 0.015
-    field_nodes: int = 60_000
+    field_nodes: int = 24_000

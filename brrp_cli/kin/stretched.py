@@ -1,6 +1,8 @@
-"""The mesh and the distances of a stored shape, stretched."""
+"""A fit of one stored shape as a shape of its own: its mesh, bent and stretched, and distances."""
 
 from __future__ import annotations
+
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,50 +11,87 @@ from scipy.sparse.csgraph import connected_components
 
 from brrp_cli.config import KinConfig
 from brrp_cli.geometry import similarity
+from brrp_cli.kin.bend import TERMS
+from brrp_cli.kin.bending import BentFit, bent
+from brrp_cli.kin.evidence import Evidence
 from brrp_cli.kin.library import Library
-from brrp_cli.kin.placement import Placements, distance_and_slopes
-from brrp_cli.prior.distance_field import DistanceField
+from brrp_cli.kin.placement import Placements
+from brrp_cli.prior.distance_field import distance_field
+from brrp_cli.prior.parameters import FieldConfig
 from brrp_cli.prior.shape import StoredShape
 
 Array = NDArray[np.float64]
 
 
-def stretched(
-    placements: Placements, row: int, stored: StoredShape, library: Library, config: KinConfig
-) -> StoredShape:
-    """The shape of placement `row`, metres, about the middle of its box, axes of its stance.
+@dataclass(frozen=True)
+class BentShape:
+    """A fit bent onto what was seen, and what speaks against it; u : (n, 3) vertices of the stored
+    shape in its box; faces : (m, 3); colours : (n, 3)"""
 
-    stored : of the object that it is made of. Far from the surface, distances are right to first
-    order.
-    """
+    fit: BentFit
+    cost: float
+    u: Array
+    faces: NDArray[np.int32]
+    colours: NDArray[np.uint8]
+
+    @property
+    def T_plane_shape(self) -> Array:
+        """(4, 4) rigid, from the middle of the shape's box."""
+        c, s = np.cos(self.fit.turn), np.sin(self.fit.turn)
+        return similarity(
+            rotation=np.array([[c, -s, 0], [s, c, 0], [0, 0, 1.0]]), translation=self.fit.middle
+        )
+
+    def shape(self, config: KinConfig) -> StoredShape:
+        """Metres, about the middle of its box."""
+        import trimesh
+
+        T = self.T_plane_shape
+        vertices = (self.fit.placed(self.u) - T[:3, 3]) @ T[:3, :3]
+        mesh = trimesh.Trimesh(vertices, self.faces, process=False)
+        field = distance_field(mesh, FieldConfig(config.field_nodes, config.margin))
+        return StoredShape(vertices.astype(np.float32), self.faces, self.colours, field)
+
+
+def unbent_shape(
+    placements: Placements, row: int, stored: StoredShape, library: Library
+) -> BentShape:
+    """Placement `row` as it is; stored : the shape of the object that it is of."""
     stance = placements.stance[row]
     inverse = np.linalg.inv(library.to_object[stance].astype(np.float64))
     outer, faces = largest_piece(stored)
+    fit = BentFit(
+        library.half[stance].astype(np.float64),
+        float(placements.turn[row]),
+        placements.middle[row].astype(np.float64),
+        placements.half[row].astype(np.float64),
+        float(placements.taper[row]),
+        np.zeros((3, TERMS)),
+    )
     u = (stored.vertices[outer] - library.origin[stance]) @ inverse.T
-    at_rest = Placements(
-        placements.stance[[row]],
-        np.zeros(1, np.float32),
-        np.zeros((1, 3), np.float32),
-        placements.half[[row]],
-        placements.taper[[row]],
-    )
-    vertices = at_rest.placed(u[None])[:, 0].T
-    reach = np.abs(vertices).max(axis=0) + config.margin
-    spacing = float((np.prod(2 * reach) / config.field_nodes) ** (1 / 3))
-    shape = np.ceil(2 * reach / spacing).astype(np.int64) + 1
-    lower = -(shape - 1) * spacing / 2
-    axes = [start + spacing * np.arange(n) for start, n in zip(lower, shape, strict=True)]
-    nodes = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
-    distance = distance_and_slopes(at_rest, nodes.astype(np.float32), library)[0]
-    # Where a field is flat its slope says nothing: no node is further away than the box is long.
-    longest = 2 * float(np.linalg.norm(reach))
-    values = np.clip(distance[0], -longest, longest).reshape(tuple(shape))
-    return StoredShape(
-        vertices.astype(np.float32),
-        faces,
-        stored.colours[outer],
-        DistanceField(lower, spacing, values.astype(np.float32)),
-    )
+    return BentShape(fit, np.inf, u, faces, stored.colours[outer])
+
+
+def bent_shape(
+    shape: BentShape, evidence: Evidence, config: KinConfig, rng: np.random.Generator
+) -> BentShape:
+    """A shape bent onto what was seen."""
+    surface, normals = _sampled(shape.u, shape.faces, shape.fit.half, config.bend_points, rng)
+    fit, cost = bent(shape.fit, surface, normals, evidence, config)
+    return replace(shape, fit=fit, cost=cost)
+
+
+def _sampled(
+    u: Array, faces: NDArray[np.int32], half: Array, count: int, rng: np.random.Generator
+) -> tuple[Array, Array]:
+    """Points (count, 3) spread evenly over the surface of a mesh whose vertices u (n, 3) lie in a
+    box with half the sides `half` (3,), and the normals there; both along u."""
+    import trimesh
+
+    mesh = trimesh.Trimesh(u * half, faces, process=False)
+    points, on = trimesh.sample.sample_surface(mesh, count, seed=rng)
+    a, b, c = (u[faces[on, corner]] for corner in range(3))
+    return np.asarray(points) / half, np.cross(b - a, c - a)
 
 
 def largest_piece(
@@ -69,12 +108,3 @@ def largest_piece(
     number = np.cumsum(kept) - 1
     faces = number[stored.faces[kept[stored.faces[:, 0]]]]
     return np.flatnonzero(kept), faces.astype(np.int32)
-
-
-def pose(placements: Placements, row: int) -> Array:
-    """T_plane_shape (4, 4), rigid, of the shape that `stretched` gives."""
-    c, s = np.cos(float(placements.turn[row])), np.sin(float(placements.turn[row]))
-    return similarity(
-        rotation=np.array([[c, -s, 0], [s, c, 0], [0, 0, 1.0]]),
-        translation=placements.middle[row].astype(np.float64),
-    )

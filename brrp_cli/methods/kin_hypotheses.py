@@ -7,10 +7,11 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import expit
+from scipy.special import expit, softmax
 
 from brrp_cli.config import HypothesesConfig, KinConfig
 from brrp_cli.frames.frame import Frame
+from brrp_cli.geometry import transform_points
 from brrp_cli.inference.placed_shape import PlacedShape
 from brrp_cli.kin.evidence import Evidence, OtherDepth, gather
 from brrp_cli.kin.fit import Fits, fit_kin
@@ -18,7 +19,7 @@ from brrp_cli.kin.kept_library import kin_library
 from brrp_cli.kin.library import Library
 from brrp_cli.kin.opening import opening
 from brrp_cli.kin.placement import distance_and_slopes
-from brrp_cli.kin.stretched import pose, stretched
+from brrp_cli.kin.stretched import BentShape, bent_shape, unbent_shape
 from brrp_cli.observation.support_plane import Plane
 from brrp_cli.prior.store import Prior
 from brrp_cli.seeds import child_rng
@@ -66,10 +67,25 @@ def kin_hypotheses(
     hollow = library.hollow[fits.placements.stance[rows]]
     into = opening(evidence.seen, evidence.eye, kin.opening_share)
     shares = kin_shares(fits.score[rows], hollow, len(evidence.seen), into, kin)
-    limit = config.mean.limit
+    chosen = rows[shares >= kin.least_share]
+    if not len(chosen):
+        return []
+    names = [library.names[library.object[fits.placements.stance[row]]] for row in chosen]
+    found = [
+        bent_shape(
+            unbent_shape(fits.placements, int(row), prior.load(name).shape, library),
+            evidence,
+            kin,
+            rng,
+        )
+        for row, name in zip(chosen, names, strict=True)
+    ]
+    cost = np.array([each.cost for each in found])
+    together = shares[shares >= kin.least_share].sum()
+    relative = bent_shares(cost, library.hollow[fits.placements.stance[chosen]], into, kin)
     return [
-        _hypothesis(int(row), float(share), fits, evidence, library, prior, limit, kin)
-        for row, share in zip(rows, shares, strict=True)
+        _hypothesis(name, int(row), each, float(share), fits, evidence, library, config)
+        for name, row, each, share in zip(names, chosen, found, together * relative, strict=True)
         if share >= kin.least_share
     ]
 
@@ -102,6 +118,24 @@ def kin_shares(
     return np.asarray(together * relative / relative.sum())
 
 
+def bent_shares(
+    cost: NDArray[np.floating], hollow: NDArray[np.floating], into: float, config: KinConfig
+) -> Array:
+    """Shares (k,) of what `kin_shares` gives them all, of fits with these costs (k,) once bent.
+
+    hollow, into : as in `kin_shares`; a solid has to fit best, since the completion is good at
+    solids, and a hollow thing that the camera looks into least
+    """
+    best = int(np.argmin(cost))
+    walls = float(_walls(hollow[[best]], config)[0])
+    closed, wall, opened = np.log(config.most_cost)
+    most = closed + walls * (np.interp(into, config.opening, [wall, opened]) - closed)
+    together = expit(config.cost_sharpness * (most - np.log(cost[best])))
+    relative = softmax(-config.sharpness * cost)
+    relative = np.where(relative >= config.least_share, relative, 0)
+    return np.asarray(together * relative / relative.sum())
+
+
 def _walls(hollow: NDArray[np.floating], config: KinConfig) -> Array:
     """(k,) from 0, a solid, to 1, a hollow thing, of shares of hollow space."""
     low, high = config.hollow
@@ -127,29 +161,29 @@ def _distinct(fits: Fits, library: Library, config: KinConfig) -> NDArray[np.int
 
 
 def _hypothesis(
+    name: str,
     row: int,
+    bent: BentShape,
     share: float,
     fits: Fits,
     evidence: Evidence,
     library: Library,
-    prior: Prior,
-    limit: float,
-    config: KinConfig,
+    config: HypothesesConfig,
 ) -> KinHypothesis:
-    placements = fits.placements
-    stance = placements.stance[row]
-    name = library.names[library.object[stance]]
-    width = config.width + config.doubt * max(0.0, config.sure - float(fits.near[row]))
-    shape = PlacedShape(
+    kin, stance = config.kin, fits.placements.stance[[row]]
+    shape = bent.shape(kin)
+    off = shape.distance(transform_points(np.linalg.inv(bent.T_plane_shape), evidence.seen))
+    near = np.exp(-0.5 * np.square(off) / (kin.near**2 + evidence.noise**2)).mean()
+    placed = PlacedShape(
         name,
-        stretched(placements, row, prior.load(name).shape, library, config),
-        evidence.T_cam_plane @ pose(placements, row),
-        width,
-        limit,
+        shape,
+        evidence.T_cam_plane @ bent.T_plane_shape,
+        kin.width + kin.doubt * max(0.0, kin.sure - float(near)),
+        config.mean.limit,
         # How far the shape is off says its width; the place is part of it.
         np.zeros((6, 6)),
         kin=True,
-        exact=config.exact if _walls(library.hollow[[stance]], config)[0] > 0 else 0.0,
+        exact=kin.exact if _walls(library.hollow[stance], kin)[0] > 0 else 0.0,
     )
-    x, y, z = (float(s) for s in placements.half[row] / library.half[stance])
-    return KinHypothesis(shape, share, (x, y, z))
+    x, y, z = (float(s) for s in bent.fit.half / bent.fit.stored_half)
+    return KinHypothesis(placed, share, (x, y, z))

@@ -17,7 +17,7 @@ from brrp_cli.kin.fit import fit_kin
 from brrp_cli.kin.kept_library import kin_library
 from brrp_cli.kin.placement import Placements, distance_and_slopes
 from brrp_cli.kin.refine import refined
-from brrp_cli.kin.stretched import pose, stretched
+from brrp_cli.kin.stretched import unbent_shape
 from brrp_cli.methods.kin_hypotheses import kin_shares
 from brrp_cli.raycast import inside
 from brrp_cli.shapes import solids
@@ -140,11 +140,12 @@ def test_distances_and_slopes_are_those_of_the_stretched_mesh(prior, taper):
         half[None].astype(np.float32),
         np.array([taper], np.float32),
     )
-    shape = stretched(at, 0, prior.load("can").shape, library, KIN)
+    unbent = unbent_shape(at, 0, prior.load("can").shape, library)
+    shape = unbent.shape(KIN)
     rng = np.random.default_rng(0)
     mesh = np.asarray(shape.vertices, np.float64)
     near = mesh[rng.integers(len(mesh), size=400)] + rng.normal(0, 0.002, (400, 3))
-    on_plane = transform_points(pose(at, 0), near).astype(np.float32)
+    on_plane = transform_points(unbent.T_plane_shape, near).astype(np.float32)
     found, _, _, across = distance_and_slopes(at, on_plane, library)
     exact = shape.signed_distance(near, 0.05)
     assert np.abs(found[0] - exact).mean() < 0.0006

@@ -1,0 +1,194 @@
+"""Non-rigid refinement of one fit: points of its surface are brought onto what was seen, by damped
+Gauss-Newton steps over place, scales and a smooth bend."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from brrp_cli.config import KinConfig
+from brrp_cli.kin import bend
+from brrp_cli.kin.evidence import Evidence
+from brrp_cli.kin.ways_out import ways_out
+
+Array = NDArray[np.float64]
+
+# Turn, middle (3), logarithms of half (3), taper; then the bend's coefficients.
+FIRST = 8
+UNKNOWNS = FIRST + 3 * bend.TERMS
+LEAST = 1e-3
+
+
+@dataclass(frozen=True)
+class BentFit:
+    """x_plane = Rz(turn) diag(s, s, 1) diag(half) v + middle, with v = u + w(u) and
+    s = 1 + taper v_z (placement.py, bend.py).
+
+    stored_half : (3,) metres, of the stored object's box in this resting pose; turn : radians;
+    middle, half : (3,) metres; bend : (3, K)
+    """
+
+    stored_half: Array
+    turn: float
+    middle: Array
+    half: Array
+    taper: float
+    bend: Array
+
+    def placed(self, u: Array) -> Array:
+        """(n, 3) metres, frame of the plane, of points u (n, 3) of the stored shape's box."""
+        v = u + bend.terms(u) @ self.bend.T
+        return (v * self._sizes(v)) @ self._turned.T + self.middle
+
+    def normals(self, u: Array, stored: Array) -> Array:
+        """(n, 3) unit, frame of the plane, where the stored shape's normals along u are (n, 3)."""
+        v = u + bend.terms(u) @ self.bend.T
+        A = np.eye(3) + np.einsum("ak,nkj->naj", self.bend, bend.slopes(u))
+        A = A * self._sizes(v)[:, :, None]
+        found = np.linalg.solve(A.transpose(0, 2, 1), stored[..., None])[..., 0] @ self._turned.T
+        return np.asarray(found / np.linalg.norm(found, axis=1, keepdims=True))
+
+    def along(self, u: Array, way: Array) -> Array:
+        """(E, n): how far points u (n, 3) go along `way` (n, 3) with each unknown."""
+        v = u + bend.terms(u) @ self.bend.T
+        sizes = self._sizes(v)
+        local = way @ self._turned
+        each = local * v * sizes
+        moved = (v * sizes) @ self._turned.T
+        first = np.stack(
+            [
+                way[:, 1] * moved[:, 0] - way[:, 0] * moved[:, 1],
+                *way.T,
+                *each.T,
+                (each[:, 0] + each[:, 1]) / sizes[:, 0] * self.half[0] * np.clip(v[:, 2], -1, 1),
+            ]
+        )
+        curved = np.einsum("na,nk->akn", local * sizes, bend.terms(u))
+        return np.concatenate([first, curved.reshape(-1, len(u))])
+
+    def stepped(self, step: Array, config: KinConfig) -> BentFit:
+        """After a step (E,), no part of which is longer than a step of `refined` may be."""
+        largest = [
+            config.step_turn,
+            *[config.step_shift] * 3,
+            *[config.step_size] * 3,
+            config.step_taper,
+        ]
+        first = np.clip(step[:FIRST], -np.array(largest), np.array(largest))
+        taper = np.clip(self.taper + first[7], -config.most_taper, config.most_taper)
+        curved = self.bend + step[FIRST:].reshape(self.bend.shape)
+        return replace(
+            self,
+            turn=self.turn + float(first[0]),
+            middle=self.middle + first[1:4],
+            half=self.half * np.exp(first[4:7]),
+            taper=float(taper),
+            bend=bend.unfolded(curved, config.bend_steepest),
+        )
+
+    @property
+    def _turned(self) -> Array:
+        c, s = np.cos(self.turn), np.sin(self.turn)
+        return np.array([[c, -s, 0], [s, c, 0], [0, 0, 1.0]])
+
+    def _sizes(self, v: Array) -> Array:
+        """(n, 3): metres of one unit of v."""
+        wide = 1 + self.taper * np.clip(v[:, 2], -1, 1)
+        return self.half * np.column_stack([wide, wide, np.ones_like(wide)])
+
+
+def bent(
+    fit: BentFit,
+    surface: Array,
+    normals: Array,
+    evidence: Evidence,
+    config: KinConfig,
+) -> tuple[BentFit, float]:
+    """The fit, and what speaks against it, after `config.bend_steps` steps, of which those
+    that make it worse are not taken.
+
+    surface, normals : (n, 3) points of the stored shape's surface and its normals there, along u
+    """
+    precision = bend.prior_precision(fit.stored_half, config)
+    cost, H, g = _system(fit, surface, normals, evidence, precision, config)
+    damping = config.bend_damping
+    for _ in range(config.bend_steps):
+        held = H + damping * np.diag(np.diag(H)) + LEAST * np.eye(UNKNOWNS)
+        step = -np.asarray(np.linalg.solve(held, g), dtype=np.float64)
+        tried = fit.stepped(step, config)
+        found = _system(tried, surface, normals, evidence, precision, config)
+        if found[0] < cost:
+            fit, (cost, H, g), damping = tried, found, damping / 4
+        else:
+            damping *= 8
+    return fit, cost
+
+
+def _system(
+    fit: BentFit,
+    surface: Array,
+    stored_normals: Array,
+    evidence: Evidence,
+    precision: Array,
+    config: KinConfig,
+) -> tuple[float, Array, Array]:
+    """Cost, its Gauss-Newton Hessian (E, E) and its gradient (E,)."""
+    cost, H, g = _prior(fit, precision, config)
+    points = fit.placed(surface)
+    normals = fit.normals(surface, stored_normals)
+    # What was seen faces the camera: of a wall, the side that does.
+    facing = np.flatnonzero(np.einsum("ni,ni->n", normals, evidence.eye - points) > 0)
+    seen = evidence.seen.astype(np.float64)
+    if len(facing):
+        _, nearest = cKDTree(points[facing]).query(seen)
+        row = facing[nearest]
+        apart, way = seen - points[row], normals[row]
+        off = np.einsum("ni,ni->n", apart, way)
+        length = np.linalg.norm(apart, axis=1)
+        # Beyond an edge no surface is near: it is to reach as far.
+        beyond = np.sqrt(np.maximum(length**2 - off**2, 0)) > config.bend_beyond
+        way = np.where(beyond[:, None], apart / np.maximum(length, 1e-9)[:, None], way)
+        off = np.where(beyond, length, off)
+        ratio = 1 / (1 + (off / config.robust) ** 2)
+        share = 1 / config.sigma**2 / len(seen)
+        cost += share * float((off**2 * ratio).sum()) / 2
+        _add(H, g, -fit.along(surface[row], way), off, share * ratio**2)
+    amount, way = ways_out(points, evidence, config)
+    there = np.flatnonzero(amount)
+    if len(there):
+        share = config.out_pull / config.free_sigma**2 / len(points)
+        off = amount[there]
+        slack = np.minimum(1, config.robust / off)
+        cost += share * float((off**2 * slack * (2 - slack)).sum()) / 2
+        _add(H, g, -fit.along(surface[there], way[there]), off, share * slack)
+    return cost, H, g
+
+
+def _add(H: Array, g: Array, rows: Array, residual: Array, weight: Array) -> None:
+    H += (rows * weight) @ rows.T
+    g += rows @ (weight * residual)
+
+
+def _prior(fit: BentFit, precision: Array, config: KinConfig) -> tuple[float, Array, Array]:
+    """Of sizes, stretches, taper, the underside (refine.py) and the bend."""
+    H, g = np.zeros((UNKNOWNS, UNKNOWNS)), np.zeros(UNKNOWNS)
+    log = np.log(fit.half / fit.stored_half)
+    mean, spread = np.full((3, 3), 1 / 3), np.eye(3) - 1 / 3
+    metric = mean / 3 / config.size_deviation**2 + spread / config.stretch_deviation**2
+    lift = np.zeros(FIRST)
+    lift[3], lift[6] = 1, -fit.half[2]
+    height = float(fit.middle[2] - fit.half[2])
+    H[4:7, 4:7] = metric
+    H[7, 7] = 1 / config.taper_deviation**2
+    H[:FIRST, :FIRST] += np.outer(lift, lift) / config.lift_deviation**2
+    H[FIRST:, FIRST:] = precision
+    g[4:7] = metric @ log
+    g[7] = fit.taper / config.taper_deviation**2
+    g[:FIRST] += lift * height / config.lift_deviation**2
+    g[FIRST:] = precision @ fit.bend.ravel()
+    cost = log @ metric @ log + fit.taper**2 / config.taper_deviation**2
+    cost += (height / config.lift_deviation) ** 2 + fit.bend.ravel() @ g[FIRST:]
+    return config.pull * float(cost) / 2, config.pull * H, config.pull * g
