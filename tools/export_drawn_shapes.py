@@ -5,7 +5,8 @@
 
 household: hNNN_KIND.obj, boxes, cans, bottles, mugs, bowls, plates, tools and fruit of
 `tools/drawn/household.py`, of random dimensions. composed: cNNN.obj, solids of no kind, a few parts
-that run into each other. Each is drawn from its own random numbers, so that shape NNN of a seed is
+that run into each other. plain: pNNN.obj, boxes, cylinders, prisms, cones and ellipsoids, from
+5 to 25 cm long. Each is drawn from its own random numbers, so that shape NNN of a seed is
 the same whatever the count.
 """
 
@@ -23,6 +24,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from drawn.composed import draw_composed_shape
 from drawn.household import draw_household_shape
+from drawn.plain import draw_plain_shape
 
 from brrp_cli.errors import BrrpError
 from brrp_cli.files import write_bytes
@@ -38,7 +40,11 @@ def _composed(seed: int, number: int) -> tuple[str, Any]:
     return f"c{number:03d}", draw_composed_shape(child_rng(seed, "composed", number))
 
 
-KINDS = {"household": _household, "composed": _composed}
+def _plain(seed: int, number: int) -> tuple[str, Any]:
+    return f"p{number:03d}", draw_plain_shape(child_rng(seed, "plain", number))
+
+
+KINDS = {"household": _household, "composed": _composed, "plain": _plain}
 
 
 @click.command()

@@ -12,6 +12,7 @@ from scipy.ndimage import binary_dilation, maximum_filter, minimum_filter
 
 from brrp_cli.completion.network import fitted
 from brrp_cli.completion.point_features import point_features
+from brrp_cli.completion.usual_size import of_usual_size
 from brrp_cli.completion.visible_part import VisiblePart
 from brrp_cli.config import MeanConfig
 from brrp_cli.frames.dilate import dilated
@@ -84,16 +85,18 @@ def shell_of(nodes: Array, config: MeanConfig) -> float:
 
 def _network(part: VisiblePart) -> Callable[[Array], Floats]:
     """Log odds (n,) at points (n, 3), by the network that the configuration chooses."""
+    part, scale = of_usual_size(part)
     if part.config.learned:
         # torch takes its time to load.
         from brrp_cli.completion.learned import LearnedShape, shapes
 
-        return LearnedShape(part, part.config.volume, shapes()).logits
+        learned = LearnedShape(part, part.config.volume, shapes())
+        return lambda points: learned.logits(points * scale)
 
     def from_lengths(points: Array) -> Floats:
         if not len(points):
             return np.empty(0, np.float32)
-        return fitted().logits(point_features(points, part))
+        return fitted().logits(point_features(points * scale, part))
 
     return from_lengths
 

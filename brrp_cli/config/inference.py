@@ -86,6 +86,8 @@ class CompletionConfig:
         `volume`; otherwise by a smaller one that sees lengths at a point alone
     bias : nats added to its log odds: a network that is right at each point on average makes thin
         things, whose place is in doubt, thinner than they are
+    largest : metres, diagonal of the seen points' box; a larger object is looked at as one of this
+        size that looks the same (completion/usual_size.py)
     cell : metres, of grids in which observed points are merged; closing : gaps of fewer cells are
     closed
 
@@ -109,6 +111,7 @@ class CompletionConfig:
 
     learned: bool = True
     bias: float = between(0.2, -5.0, 5.0)
+    largest: float = 0.2
     cell: float = 0.004
     closing: int = 7
     least: float = 0.005

@@ -26,7 +26,7 @@ class Shortlist:
         self._config = config
         self._first = first
         self._all = np.arange(len(first.colour))
-        self.plain = ~first.colour.any(axis=1)
+        self.plain = np.asarray(~first.colour.any(axis=1), dtype=np.bool_)
 
     def rows(self, seen: SeenObject, histograms: NDArray[np.floating] | None) -> NDArray[np.int64]:
         """Rows (m,) of the table that are to be looked at, ascending."""

@@ -114,7 +114,7 @@ def test_what_is_seen_has_some_thickness_whatever_the_network_says():
 def test_the_lattice_is_the_networks_where_it_counts(nodes, learned):
     frame = photographed(box(), placed(0.0, 0.0, 0.3))
     config = replace(BARE, nodes=nodes)
-    part = part_of(frame, config=replace(CONFIG, learned=learned))
+    part = part_of(frame, config=replace(CONFIG, learned=learned, largest=1.0))
     extent = part.extent
     around = np.stack([extent.min(axis=0) - 0.01, extent.max(axis=0) + 0.01])
     _, _, at = grid_over(around, config.nodes)
