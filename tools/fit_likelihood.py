@@ -11,7 +11,8 @@ average; where none is, "none of them" is right. What is minimised is the mean o
 of what is right, with a pull to the constants in use. Printed are values for LikelihoodConfig in
 brrp_cli/config/registration.py, and what becomes of each set.
 
-One line of OUTPUT for each mask; a second run goes on where the first was stopped.
+One line of OUTPUT for each mask; a second run goes on where the first was stopped, and may add
+masks of another prior: in one of 100 objects or more P(c|R) knows the depth, in a small one not.
 """
 
 from __future__ import annotations
@@ -39,7 +40,18 @@ from brrp_cli.prior.store import open_prior
 from brrp_cli.progress import progress
 from brrp_cli.registration.weigh import weigh
 
-FITTED = ("depth", "missed", "covered", "free_space", "below", "colour", "base", "most_votes")
+FITTED = (
+    "depth",
+    "depth_aligned",
+    "missed",
+    "covered",
+    "free_space",
+    "unmasked",
+    "below",
+    "colour",
+    "base",
+    "most_votes",
+)
 # Of ln of a constant, nats of `base`: how far the fit may go from the constants in use.
 PULL = 1.0
 
@@ -65,7 +77,8 @@ def main(
         prior = open_prior(prior_path)
         done = {(mask.group, mask.scene) for mask in masks}
         for folder in sets:
-            group = folder.name + (", masks from depth" if segmented else "")
+            group = f"{folder.name}, {prior_path.name}"
+            group += ", masks from depth" if segmented else ""
             for scene in progress(find_scenes(folder), group):
                 if (group, scene.name) in done:
                     continue
@@ -88,14 +101,16 @@ def main(
 
 def ratios(mask: Mask, config: LikelihoodConfig) -> NDArray[np.float64]:
     """Log likelihood ratios (C,), nats, of the placements of one mask."""
+    depth = config.depth_aligned if mask.aligned else config.depth
     return np.array(
         [
             config.base
             + (
-                config.depth * each.depth
+                depth * each.depth
                 - config.missed * each.missed
                 + config.covered * each.covered
                 - config.free_space * each.free
+                - config.unmasked * each.unmasked
             )
             / (1 + each.votes / config.most_votes)
             - config.below * each.below

@@ -214,11 +214,16 @@ class LikelihoodConfig:
     `reach`; other_shape : metres, standard deviation by which another shape is off where it was
     fitted, other_strays : and its strays
     free : metres behind the rendered depth from which on a measured one says that it is not there;
+    nearer, it may be the object's;
     on_table : metres, own pixels no higher may be the table's: none of them is missed
     tolerance, slope : metres below the table from which model surface counts, and on which it comes
     to count fully; surface_points : of the model that are asked
-    depth, missed, covered, free_space, below, colour : nats for a nat of depth residuals, a vote of
-    missed, covered or free pixels, all of the surface below the table, full correlation of colours
+    colours : pixels of the object, and around it, whose colours unmasked pixels are compared with;
+    colour_spread : L*a*b*, by which those of one thing differ
+    depth, missed, covered, free_space, unmasked, below, colour : nats for a nat of depth residuals,
+    a vote of missed, covered, free or unmasked pixels, all of the surface below the table, full
+    correlation of colours; depth_aligned : takes the place of `depth` where P(c|R) follows from how
+    stored objects lie over the measured depth, which would count twice
     most_votes : that all votes can come to; base : nats of any placement
     other_size : nats against a placement at another size than the stored one
     within : placements whose alignment score is less than the best by more have no weight
@@ -236,14 +241,18 @@ class LikelihoodConfig:
     tolerance: float = 0.003
     slope: float = 0.012
     surface_points: int = 600
-    depth: float = 1.1
-    missed: float = 4.7
-    covered: float = 0.27
-    free_space: float = 3.0
-    below: float = 6.0
-    colour: float = 4.4
-    most_votes: float = 13.0
-    base: float = between(0.6, -50.0, 50.0)
+    colours: int = 150
+    colour_spread: float = 6.0
+    depth: float = 3.0
+    depth_aligned: float = 0.4
+    missed: float = 18.0
+    covered: float = 0.8
+    free_space: float = 10.0
+    unmasked: float = 5.0
+    below: float = 20.0
+    colour: float = 6.0
+    most_votes: float = 2.0
+    base: float = between(0.5, -50.0, 50.0)
     other_size: float = 3.6
     within: float = 0.5
 

@@ -32,7 +32,7 @@ from brrp_cli.registration.weigh import (
     log_likelihoods,
     weigh,
 )
-from brrp_cli.retrieval.base import Retriever, top_k, unknown
+from brrp_cli.retrieval.base import Retriever, knows_depth, top_k, unknown
 from brrp_cli.seeds import child_rng, child_seed
 from brrp_cli.timing import timed
 
@@ -60,8 +60,8 @@ def reconstruct_by_hypotheses(
     noise : of the frame's pixels; earlier : views of the object in the stream's earlier frames;
     None = there is no stream
     """
-    hypotheses = config.hypotheses
-    assert hypotheses is not None
+    assert config.hypotheses is not None
+    hypotheses = _counted_once(config.hypotheses, retriever)
     seconds: dict[str, float] = {}
     object_id = observation.object_id
     views = ALONE if earlier is None else earlier
@@ -212,6 +212,14 @@ def reconstruct_by_hypotheses(
         seconds=seconds,
         memory=memory,
     )
+
+
+def _counted_once(config: HypothesesConfig, retriever: Retriever) -> HypothesesConfig:
+    """With less worth of depth residuals where P(c|R) follows from depth already."""
+    likelihood = config.likelihood
+    if not knows_depth(retriever):
+        return config
+    return replace(config, likelihood=replace(likelihood, depth=likelihood.depth_aligned))
 
 
 def _shared_with_kin(weights: Array, like: list[KinHypothesis]) -> Array:

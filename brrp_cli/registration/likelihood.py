@@ -10,6 +10,8 @@ was measured:
                  that is another one is off where it was fitted, e and e' the shares of strays
     silhouette   own pixels that the mesh leaves bare, or covers
     free space   pixels of others which the mesh would hide and does not
+    unmasked     pixels that the mesh would show, by their depth, and that belong to no object: each
+                 as far as its colour is that of the surroundings and not the object's
     below        model surface under the table
     colour       how well the stored colours agree with the image's
 
@@ -29,12 +31,13 @@ from numpy.typing import NDArray
 
 from brrp_cli.config import ColourConfig, LikelihoodConfig
 from brrp_cli.frames.dilate import dilated
-from brrp_cli.frames.frame import Frame
+from brrp_cli.frames.frame import BACKGROUND, Frame
 from brrp_cli.geometry import transform_points
 from brrp_cli.observation.pixel_noise import PixelNoise
 from brrp_cli.observation.support_plane import Plane
 from brrp_cli.registration.colour_pose import colour_agreement
 from brrp_cli.registration.model import Model
+from brrp_cli.registration.surroundings import Surroundings, like_surroundings, surroundings
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -45,9 +48,10 @@ class SeenObject:
     """What a frame shows of one object and around it, on every `stride`-th pixel: (h, w) arrays.
 
     rays : (h, w, 3), z = 1; patch : number of the patch; own : the object's, with depth; beside :
-    nearer to its mask than sensors blur; on_table : as high as the table; depth : metres, NaN where
-    there is none; fine : metres; steady : away from jumps of depth
-    wave : metres, of patches; rays_per_patch, patches_per_vote : 1 or more
+    nearer to its mask than sensors blur; on_table : as high as the table; background : no object's;
+    depth : metres, NaN where there is none; fine : metres; steady : away from jumps of depth
+    wave : metres, of patches; rays_per_patch, patches_per_vote : 1 or more; colours : of the object
+    and around it
     """
 
     frame: Frame
@@ -58,6 +62,7 @@ class SeenObject:
     own: Mask
     beside: Mask
     on_table: Mask
+    background: Mask
     depth: Array
     fine: NDArray[np.float32]
     steady: Mask
@@ -65,6 +70,7 @@ class SeenObject:
     rays_per_patch: float
     patches_per_vote: float
     bleed: int
+    colours: Surroundings
 
 
 @dataclass(frozen=True)
@@ -75,6 +81,7 @@ class PlacementEvidence:
     normal, metres; of it by the sensor, metres^2; part of a patch that is seen
     missed, covered : votes of the object's pixels that the mesh leaves bare and that it covers
     free : votes of pixels that the mesh would hide, and where something behind it was seen
+    unmasked : votes of pixels of no object that the mesh would show, in the surroundings' colours
     below : share of the model's surface under the table
     colour : correlation, -1 to 1
     """
@@ -86,6 +93,7 @@ class PlacementEvidence:
     missed: float
     covered: float
     free: float
+    unmasked: float
     below: float
     colour: float
 
@@ -117,6 +125,7 @@ def see(
     on_table = np.zeros(valid.shape, dtype=np.bool_)
     if plane is not None:
         on_table = plane.signed_distance(frame.points[part]) < config.on_table
+    own, background = mask[part] & valid, frame.segmap[part] == BACKGROUND
     across = int(np.ceil(frame.shape[1] / cell)) + 1
     return SeenObject(
         frame=frame,
@@ -127,9 +136,10 @@ def see(
             axis=-1,
         ),
         patch=(v // cell).astype(np.int64) * across + (u // cell).astype(np.int64),
-        own=mask[part] & valid,
+        own=own,
         beside=beside[part],
         on_table=on_table,
+        background=background,
         depth=depth,
         fine=noise.fine[part],
         steady=~noise.at_jump[part],
@@ -137,6 +147,7 @@ def see(
         rays_per_patch=(cell / stride) ** 2,
         patches_per_vote=noise.patches_per_vote,
         bleed=max(1, round(blur / stride)),
+        colours=surroundings(frame.rgb[part], own, background, config.colours),
     )
 
 
@@ -159,7 +170,9 @@ def evidence(
     near_hit = binary_dilation(hit, iterations=seen.bleed)
     with np.errstate(invalid="ignore"):
         behind = np.where(hit, depth - rendered, np.nan)
-        free = ~own & ~seen.beside[part] & (behind > config.free)
+        beyond = ~own & ~seen.beside[part]
+        free = beyond & (behind > config.free)
+        shown = beyond & seen.background[part] & (np.abs(behind) <= config.free)
     missed = own & ~near_hit & ~seen.on_table[part]
     residual, variance, share = _patches(
         own & hit & seen.steady[part], behind, lean, seen.patch[part], seen.fine[part], seen, config
@@ -173,6 +186,7 @@ def evidence(
         missed=float(missed.sum() / votes),
         covered=float((own & near_hit).sum() / votes),
         free=float(free.sum() / votes),
+        unmasked=_surrounding(shown, part, seen, config) / votes,
         below=_below(T_cam_model, model, seen.plane, config),
         colour=colour_agreement(T_cam_model, model, seen.frame, colour)
         if model.stored.record.get("coloured")
@@ -190,6 +204,7 @@ def log_likelihood(found: PlacementEvidence, config: LikelihoodConfig) -> float:
         - config.missed * found.missed
         + config.covered * found.covered
         - config.free_space * found.free
+        - config.unmasked * found.unmasked
     ) / (1 + votes / config.most_votes)
     return config.base + counted - config.below * found.below + config.colour * found.colour
 
@@ -253,6 +268,14 @@ def _patches(
     share = np.minimum(count / seen.rays_per_patch, 1.0)
     enough = share >= config.least_share
     return residual[enough], variance[enough], share[enough]
+
+
+def _surrounding(
+    shown: Mask, part: tuple[slice, slice], seen: SeenObject, config: LikelihoodConfig
+) -> float:
+    """How many of the pixels `shown` of a part have the surroundings' colours."""
+    rgb = seen.frame.rgb[:: seen.stride, :: seen.stride][part][shown]
+    return float(like_surroundings(rgb, seen.colours, config.colour_spread).sum())
 
 
 def _below(

@@ -36,7 +36,8 @@ class AppearanceRetriever:
     """P(c|R) from colour, shape and size.
 
     The objects of a frame are judged together, since one light falls on all of them: the first
-    question about a frame costs as much as all of its objects, the others cost nothing.
+    question about a frame costs as much as all of its objects, the others cost nothing. `aligns`
+    tells whether objects are laid over what is seen, as they are in large priors.
     """
 
     name = "appearance"
@@ -52,9 +53,9 @@ class AppearanceRetriever:
         self._local = local_lights(self._gains, own.illuminants)
         self._names = prior.names
         self._aligner = Aligner(prior, own.alignment)
-        self._aligns = len(prior.names) >= own.alignment.from_objects
+        self.aligns = len(prior.names) >= own.alignment.from_objects
         self._similarity = own.similarity
-        if not self._aligns:
+        if not self.aligns:
             self._similarity = replace(own.similarity, blur=0.0, size_most=np.inf)
         # The paper's preset has no numbers of its own for the sensor.
         hypotheses = config.hypotheses or HypothesesConfig()
@@ -67,7 +68,7 @@ class AppearanceRetriever:
         if frame is not self._frame:
             found = self.evidence(frame)
             own = self._config.retrieval
-            weights = own.fusion if self._aligns else own.likeness
+            weights = own.fusion if self.aligns else own.likeness
             answers = self._believe(list(found.values()), weights)
             self._answers = dict(zip(found, answers, strict=True))
             self._frame = frame
@@ -95,7 +96,7 @@ class AppearanceRetriever:
                 seen, histograms, stored, rows, len(self._gains), self._similarity
             )
             points[object_id] = seen.points
-        if not self._aligns:
+        if not self.aligns:
             return looks
         if plane is None:
             return {i: replace(look, alignment=own.alignment.neutral) for i, look in looks.items()}

@@ -17,7 +17,11 @@ from brrp_cli.frames.frame import Frame
 
 
 class Retriever(Protocol):
-    """Gives P(c|R) over the objects of one prior. `name` is written beside the results."""
+    """Gives P(c|R) over the objects of one prior. `name` is written beside the results.
+
+    One that lays stored objects over the measured depth says so with `aligns` = True: see
+    `knows_depth`.
+    """
 
     @property
     def name(self) -> str:
@@ -29,6 +33,12 @@ class Retriever(Protocol):
         The sum is at most 1. What is missing from 1 is the probability that the prior does not hold
         the object (`unknown`); a retriever that cannot tell gives a sum of 1.
         """
+
+
+def knows_depth(retriever: Retriever) -> bool:
+    """Whether P(c|R) follows from how stored objects lie over the measured depth, too: that depth
+    is not to count a second time in full."""
+    return bool(getattr(retriever, "aligns", False))
 
 
 def unknown(probabilities: NDArray[np.floating]) -> float:

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brrp_cli.frames.frame import Frame
-from brrp_cli.retrieval.base import Retriever
+from brrp_cli.retrieval.base import Retriever, knows_depth
 
 
 class RememberingRetriever:
@@ -29,6 +29,11 @@ class RememberingRetriever:
     def name(self) -> str:
         """The asked retriever's name."""
         return self._retriever.name
+
+    @property
+    def aligns(self) -> bool:
+        """Whether the asked retriever knows the depth."""
+        return knows_depth(self._retriever)
 
     def probabilities(self, frame: Frame, object_id: int) -> NDArray[np.float64]:
         """P(c|R) (n,) for one object; `frame` must be the same each time."""

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brrp_cli.frames.frame import Frame
-from brrp_cli.retrieval.base import Retriever, unknown
+from brrp_cli.retrieval.base import Retriever, knows_depth, unknown
 
 
 class BothRetriever:
@@ -22,6 +22,11 @@ class BothRetriever:
     def __init__(self, first: Retriever, second: Retriever) -> None:
         self._first = first
         self._second = second
+
+    @property
+    def aligns(self) -> bool:
+        """Whether one of the two knows the depth."""
+        return knows_depth(self._first) or knows_depth(self._second)
 
     def probabilities(self, frame: Frame, object_id: int) -> NDArray[np.float64]:
         """P(c|R) (n,) for one object of the frame; the sum is that of the second retriever."""

@@ -92,7 +92,8 @@ def test_however_many_patches_there_are_they_count_as_so_many_votes():
     def of(count):
         flat = np.zeros(count)
         return log_likelihood(
-            PlacementEvidence(flat, flat + 1e-6, flat + 1, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0), CONFIG
+            PlacementEvidence(flat, flat + 1e-6, flat + 1, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
+            CONFIG,
         )
 
     each = of(1) * (1 + 1 / CONFIG.most_votes) - CONFIG.base / CONFIG.most_votes - CONFIG.base
@@ -125,6 +126,26 @@ def test_another_object_in_front_excuses():
         {ID: in_camera(solids.moved(solids.box(0.1, 0.06, 0.07), z=0.07), placed(*WHERE))}
     )
     assert look_at("box", truth(model), seen_in(alone)).free > 0.5
+
+
+def test_what_is_measured_where_the_mask_ends_speaks_against_in_the_surroundings_colours():
+    """Depth goes on beside half of a box as the placed box does, and no mask holds that. It is
+    other than the object if it has the table's colours; with the box's, the mask has lost it."""
+    model = search_model(stored("box"))
+    frame = photograph({ID: in_camera(MESHES["box"](), placed(*WHERE))})
+    whole = frame.segmap == ID
+    left = whole & (np.arange(frame.shape[1]) < np.nonzero(whole)[1].mean())
+    half = replace(frame, segmap=np.where(left, 0, frame.segmap))
+    rgb = np.full((*frame.shape, 3), 120, np.uint8)
+    rgb[whole & ~left] = [200, 40, 40]
+    other = look_at("box", truth(model), seen_in(replace(half, rgb=rgb)))
+    rgb[left] = [200, 40, 40]
+    lost = look_at("box", truth(model), seen_in(replace(half, rgb=rgb)))
+    assert other.free == lost.free == 0
+    assert other.unmasked > 0.5 * other.covered
+    assert lost.unmasked < 0.1 * other.unmasked
+    assert log_likelihood(other, CONFIG) < log_likelihood(lost, CONFIG) - 3
+    assert look_at("box", truth(model), seen_in(replace(frame, rgb=rgb))).unmasked == 0
 
 
 def test_what_lies_under_the_table_speaks_against(ball):

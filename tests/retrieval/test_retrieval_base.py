@@ -1,7 +1,11 @@
 import numpy as np
 import pytest
 
-from brrp_cli.retrieval.base import top_k
+from brrp_cli.retrieval.base import knows_depth, top_k
+from brrp_cli.retrieval.cached import RememberingRetriever
+from brrp_cli.retrieval.checked import CheckedRetriever
+from brrp_cli.retrieval.combined import BothRetriever
+from brrp_cli.retrieval.given import UniformRetriever
 
 
 def test_top_k_orders_by_probability_then_name() -> None:
@@ -28,3 +32,18 @@ def test_top_k_is_the_head_of_a_sorted_list() -> None:
         ranked = sorted(zip(names, values, strict=True), key=lambda t: (-t[1], t[0]))
         for k in (0, 1, 3, count, count + 1):
             assert top_k(values, names, k) == ranked[:k]
+
+
+def test_whoever_asks_an_aligning_retriever_knows_the_depth() -> None:
+    plain = UniformRetriever(["a", "b"])
+    aligning = UniformRetriever(["a", "b"])
+    aligning.aligns = True  # type: ignore[attr-defined]
+    for asked, told in ((plain, False), (aligning, True)):
+        around = (
+            asked,
+            CheckedRetriever(asked, 2),
+            RememberingRetriever(asked),
+            BothRetriever(asked, plain),
+            BothRetriever(plain, asked),
+        )
+        assert [knows_depth(each) for each in around] == [told] * 5

@@ -28,6 +28,7 @@ def evidence(rng, *, right):
         missed=float(rng.exponential(0.2 if right else 2)),
         covered=count / 10,
         free=float(rng.exponential(0.1 if right else 1)),
+        unmasked=float(rng.exponential(0.1 if right else 1)),
         below=float(rng.uniform(0, 0.02 if right else 0.2)),
         colour=float(rng.uniform(0.3 if right else -0.3, 0.8)),
     )
@@ -43,7 +44,7 @@ def masks(count):
             placed(evidence(rng, right=right), likelihood, 0.4, resized=bool(i == 2), right=right)
             for i, right in enumerate((stored, False, False))
         ]
-        found.append(Mask("made", "0", number, "thing", 2000, stored, 0.3, rows))
+        found.append(Mask("made", "0", number, "thing", 2000, stored, 0.3, False, rows))
     return found
 
 
@@ -52,9 +53,12 @@ def test_it_counts_as_the_likelihood_does():
     for config in (LikelihoodConfig(), LikelihoodConfig(missed=9.0, most_votes=5.0, base=-1.0)):
         told = evidence(rng, right=False)
         row = placed(told, config, 0.5, resized=True, right=False)
-        mask = Mask("made", "0", 1, "thing", 100, True, 0.2, [row])
+        mask = Mask("made", "0", 1, "thing", 100, True, 0.2, False, [row])
         expected = log_likelihood(told, config) - config.other_size
         assert ratios(mask, config) == pytest.approx([expected])
+        less = replace(config, depth=config.depth_aligned)
+        expected = log_likelihood(told, less) - config.other_size
+        assert ratios(replace(mask, aligned=True), config) == pytest.approx([expected])
 
 
 def test_the_fit_undoes_constants_that_were_spoilt():

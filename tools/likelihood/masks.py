@@ -25,7 +25,7 @@ from brrp_cli.registration.model import search_model
 from brrp_cli.registration.pose_search import Hypothesis, search
 from brrp_cli.registration.scale_scan import observed_cloud
 from brrp_cli.registration.verification import Verifier
-from brrp_cli.retrieval.base import top_k, unknown
+from brrp_cli.retrieval.base import knows_depth, top_k, unknown
 from brrp_cli.retrieval.choose import choose_retriever
 from brrp_cli.seeds import child_rng, child_seed
 from brrp_cli.segmentation.segment import segment
@@ -45,6 +45,7 @@ class Placed:
     missed: float
     covered: float
     free: float
+    unmasked: float
     below: float
     colour: float
     resized: bool
@@ -53,7 +54,8 @@ class Placed:
 
 @dataclass(frozen=True)
 class Mask:
-    """group : name of its set; scene, number : which; missing : P(not in the prior | R)"""
+    """group : name of its set; scene, number : which; missing : P(not in the prior | R); aligned :
+    whether P(c|R) knows the depth"""
 
     group: str
     scene: str
@@ -62,6 +64,7 @@ class Mask:
     pixels: int
     stored: bool
     missing: float
+    aligned: bool
     placed: list[Placed]
 
 
@@ -124,6 +127,7 @@ def collect(
                 len(mine),
                 name in prior.names,
                 float(unknown(probabilities)),
+                knows_depth(retriever),
                 rows,
             )
         )
@@ -147,6 +151,7 @@ def placed(
         missed=told.missed,
         covered=told.covered,
         free=told.free,
+        unmasked=told.unmasked,
         below=told.below,
         colour=float(told.colour),
         resized=resized,
