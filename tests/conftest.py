@@ -34,6 +34,9 @@ def workers_are_forked(no_clip_of_the_users):
     with pytest.MonkeyPatch.context() as patch:
         # Where the package is installed, it is loaded from there and not from this folder.
         patch.setenv("PYTHONSAFEPATH", "1")
+        # OpenMP's threads do not survive a fork: what waits for one then waits for ever.
+        for name in processes.ONE_THREAD:
+            patch.setenv(name, "1")
         ensure_running()
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(processes, "START", "forkserver")
