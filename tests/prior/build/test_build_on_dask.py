@@ -5,6 +5,7 @@ from __future__ import annotations
 import multiprocessing
 import os
 import signal
+import time
 from collections.abc import Generator
 from pathlib import Path
 from typing import Any
@@ -40,6 +41,17 @@ def wanted(boxes: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, b
     return prior_bytes(out)
 
 
+def another(killed: list[int]) -> int:
+    """The process of a worker that was not killed yet: the next one may still be starting."""
+    until = time.monotonic() + 30
+    while time.monotonic() < until:
+        for worker in multiprocessing.active_children():
+            if worker.pid and worker.pid not in killed:
+                return worker.pid
+        time.sleep(0.02)
+    raise AssertionError("no worker took the place of the one that was killed")
+
+
 def test_a_cluster_makes_the_same_bytes_while_its_workers_are_killed(
     boxes: Path,
     wanted: dict[str, bytes],
@@ -47,16 +59,16 @@ def test_a_cluster_makes_the_same_bytes_while_its_workers_are_killed(
     monkeypatch: pytest.MonkeyPatch,
     capfd: pytest.CaptureFixture[str],
 ) -> None:
-    run, killed = Cluster.run, []
+    run, killed = Cluster.run, list[int]()
 
     def murderous(self: Cluster, *given: Any, **named: Any) -> Generator[Any, None, None]:
         for number, result in enumerate(run(self, *given, **named)):
             yield result
             if number < 2:
                 # It holds the next task, or one of those that are to come.
-                worker = multiprocessing.active_children()[number]
-                os.kill(worker.pid or 0, signal.SIGKILL)
-                killed.append(worker.pid)
+                worker = another(killed)
+                os.kill(worker, signal.SIGKILL)
+                killed.append(worker)
 
     monkeypatch.setattr(Cluster, "run", murderous)
     # Dask gives both up before they can be back: others must take their places.
