@@ -54,10 +54,11 @@ class KinConfig:
     `bend_damping` at first), over a cubic bend too, with `bend_points` points of their surface. A
     seen point pulls at the nearest of those that face the camera, along its normal, or straight
     where it lies beyond its edge by `bend_beyond` metres. The surface is pushed out of free space,
-    beyond `tolerance`, with `out_pull` in place of `free_pull`. Coefficients have standard
-    deviations, in halves of the box: `bend_round` where what is round stays round, `bend_even`
-    where two sides that are alike stay alike, `bend_any` of all others; `bend_lean` : radians;
-    `bend_steepest` : of the bend's slopes, so that space does not fold.
+    beyond `tolerance`, with `out_pull` in place of `free_pull`; ways aside are tried in
+    `aside_directions`, in `aside_steps` lengths between those of `aside`, metres. Coefficients have
+    standard deviations, in halves of the box: `bend_round` where what is round stays round,
+    `bend_even` where two sides that are alike stay alike, `bend_any` of all others; `bend_lean` :
+    radians; `bend_steepest` : of the bend's slopes, so that space does not fold.
     Hypotheses: of the best `kept` fits the best `hypotheses` that lie `distinct` metres apart, at
     every `distinct_step`-th point. Their weight is a logistic function of the best score, a half at
     `convincing`, with the slope `sharpness`. Of a hollow shape, whose share of hollow space reaches
@@ -140,6 +141,9 @@ class KinConfig:
     bend_lean: float = 0.1
     bend_steepest: float = share(0.6)
     out_pull: float = 5.0
+    aside: tuple[float, float] = (0.001, 0.06)
+    aside_steps: int = 14
+    aside_directions: int = 16
     near: float = 0.002
     far: float = 0.015
     violation_weight: float = 3.0

@@ -23,7 +23,7 @@ class SurfaceConfig:
     pose, from which the width of the band around it follows, looked at in `band_vertices` vertices
     Placements that are as probable as the best one are turned by steps of `turn_step` radians:
     between neighbours that are turned by `neighbours` radians at most, and all around an axis that
-    `free_turns` of them share, where any two are such neighbours
+    `free_turns` of them share to within `one_axis` radians, where any two are such neighbours
     keep_distance : metres; a component of the level set further from every observed point is
     hallucinated
     one_piece : whether an object is one piece; the published methods keep every part near what was
@@ -61,4 +61,5 @@ class SurfaceConfig:
     free_turns: int = 3
     neighbours: float = 1.0
     turn_step: float = 0.25
+    one_axis: float = 0.25
     most_off: float = share(0.05)

@@ -10,16 +10,15 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from brrp_cli.config import KinConfig
-from brrp_cli.kin import bend
+from brrp_cli.kin import bend, unknowns
 from brrp_cli.kin.evidence import Evidence
 from brrp_cli.kin.ways_out import ways_out
 
 Array = NDArray[np.float64]
 
-# Turn, middle (3), logarithms of half (3), taper; then the bend's coefficients.
-FIRST = 8
+# Those of a stretched shape; then the bend's coefficients.
+FIRST = unknowns.UNKNOWNS
 UNKNOWNS = FIRST + 3 * bend.TERMS
-LEAST = 1e-3
 
 
 @dataclass(frozen=True)
@@ -71,13 +70,7 @@ class BentFit:
 
     def stepped(self, step: Array, config: KinConfig) -> BentFit:
         """After a step (E,), no part of which is longer than a step of `refined` may be."""
-        largest = [
-            config.step_turn,
-            *[config.step_shift] * 3,
-            *[config.step_size] * 3,
-            config.step_taper,
-        ]
-        first = np.clip(step[:FIRST], -np.array(largest), np.array(largest))
+        first = unknowns.limited(step[:FIRST], config)
         taper = np.clip(self.taper + first[7], -config.most_taper, config.most_taper)
         curved = self.bend + step[FIRST:].reshape(self.bend.shape)
         return replace(
@@ -116,7 +109,7 @@ def bent(
     cost, H, g = _system(fit, surface, normals, evidence, precision, config)
     damping = config.bend_damping
     for _ in range(config.bend_steps):
-        held = H + damping * np.diag(np.diag(H)) + LEAST * np.eye(UNKNOWNS)
+        held = H + damping * np.diag(np.diag(H)) + unknowns.LEAST * np.eye(UNKNOWNS)
         step = -np.asarray(np.linalg.solve(held, g), dtype=np.float64)
         tried = fit.stepped(step, config)
         found = _system(tried, surface, normals, evidence, precision, config)
@@ -173,22 +166,16 @@ def _add(H: Array, g: Array, rows: Array, residual: Array, weight: Array) -> Non
 
 
 def _prior(fit: BentFit, precision: Array, config: KinConfig) -> tuple[float, Array, Array]:
-    """Of sizes, stretches, taper, the underside (refine.py) and the bend."""
+    """Of the stretched shape and of the bend."""
     H, g = np.zeros((UNKNOWNS, UNKNOWNS)), np.zeros(UNKNOWNS)
-    log = np.log(fit.half / fit.stored_half)
-    mean, spread = np.full((3, 3), 1 / 3), np.eye(3) - 1 / 3
-    metric = mean / 3 / config.size_deviation**2 + spread / config.stretch_deviation**2
-    lift = np.zeros(FIRST)
-    lift[3], lift[6] = 1, -fit.half[2]
-    height = float(fit.middle[2] - fit.half[2])
-    H[4:7, 4:7] = metric
-    H[7, 7] = 1 / config.taper_deviation**2
-    H[:FIRST, :FIRST] += np.outer(lift, lift) / config.lift_deviation**2
-    H[FIRST:, FIRST:] = precision
-    g[4:7] = metric @ log
-    g[7] = fit.taper / config.taper_deviation**2
-    g[:FIRST] += lift * height / config.lift_deviation**2
-    g[FIRST:] = precision @ fit.bend.ravel()
-    cost = log @ metric @ log + fit.taper**2 / config.taper_deviation**2
-    cost += (height / config.lift_deviation) ** 2 + fit.bend.ravel() @ g[FIRST:]
-    return config.pull * float(cost) / 2, config.pull * H, config.pull * g
+    cost, first_H, first_g = unknowns.size_prior(
+        fit.half[None],
+        fit.stored_half[None],
+        fit.middle[None, 2],
+        np.array([fit.taper]),
+        config,
+    )
+    pull = config.pull * precision @ fit.bend.ravel()
+    H[:FIRST, :FIRST], g[:FIRST] = first_H[0], first_g[0]
+    H[FIRST:, FIRST:], g[FIRST:] = config.pull * precision, pull
+    return float(cost[0] + fit.bend.ravel() @ pull / 2), H, g

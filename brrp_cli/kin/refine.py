@@ -10,14 +10,10 @@ from brrp_cli.config import KinConfig
 from brrp_cli.kin.evidence import Evidence
 from brrp_cli.kin.library import Library
 from brrp_cli.kin.placement import Placements, distance_and_slopes
+from brrp_cli.kin.unknowns import LEAST, UNKNOWNS, limited, size_prior
 
 Floats = NDArray[np.float32]
 Array = NDArray[np.float64]
-
-# Turn, middle (3), logarithms of half (3), taper.
-UNKNOWNS = 8
-# What no point sees, such as the turn of what is round, stays: far below any point's weight.
-LEAST = 1e-3
 
 
 def refined(
@@ -36,7 +32,13 @@ def refined(
         by_fit = rows.transpose(1, 0, 2)
         H = (by_fit * weight[:, None]) @ by_fit.transpose(0, 2, 1)
         g = (by_fit @ (weight * residual)[..., None])[..., 0]
-        prior_H, prior_g = _prior(placements, library, config)
+        _, prior_H, prior_g = size_prior(
+            placements.half,
+            library.half[placements.stance],
+            placements.middle[:, 2],
+            placements.taper,
+            config,
+        )
         H += prior_H
         g += prior_g
         diagonal = H[:, range(UNKNOWNS), range(UNKNOWNS)]
@@ -75,39 +77,8 @@ def _weights(distance: Floats, seen: int, config: KinConfig) -> Array:
     return weight
 
 
-def _prior(placements: Placements, library: Library, config: KinConfig) -> tuple[Array, Array]:
-    """Hessian (B, 8, 8) and gradient (B, 8) of sizes, stretches, taper and the underside."""
-    count = len(placements)
-    log = np.log(placements.half / library.half[placements.stance]).astype(np.float64)
-    H, g = np.zeros((count, UNKNOWNS, UNKNOWNS)), np.zeros((count, UNKNOWNS))
-    mean, spread = np.full((3, 3), 1 / 3), np.eye(3) - 1 / 3
-    metric = (
-        mean / 3 / config.size_deviation**2 + spread / config.stretch_deviation**2
-    ) * config.pull
-    H[:, 4:7, 4:7] += metric
-    g[:, 4:7] += log @ metric
-    taper = config.pull / config.taper_deviation**2
-    H[:, 7, 7] += taper
-    g[:, 7] += taper * placements.taper
-    # Underside: middle_z - half_z.
-    row = np.zeros((count, UNKNOWNS))
-    row[:, 3], row[:, 6] = 1, -placements.half[:, 2]
-    lift = (placements.middle[:, 2] - placements.half[:, 2]).astype(np.float64)
-    H += config.pull * row[:, :, None] * row[:, None] / config.lift_deviation**2
-    g += config.pull * row * lift[:, None] / config.lift_deviation**2
-    return H, g
-
-
 def _moved(placements: Placements, step: Array, config: KinConfig) -> Placements:
-    largest = np.array(
-        [
-            config.step_turn,
-            *[config.step_shift] * 3,
-            *[config.step_size] * 3,
-            config.step_taper,
-        ]
-    )
-    step = np.clip(step, -largest, largest)
+    step = limited(step, config)
     taper = np.clip(placements.taper + step[:, 7], -config.most_taper, config.most_taper)
     return Placements(
         placements.stance,

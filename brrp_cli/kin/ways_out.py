@@ -11,10 +11,6 @@ from brrp_cli.kin.evidence import Evidence
 
 Array = NDArray[np.float64]
 
-# Ways aside that are tried: directions in the image, and how far, from 1 mm to 60 mm.
-DIRECTIONS = 16
-LENGTHS = np.geomspace(0.001, 0.06, 14)
-
 
 def ways_out(points: Array, evidence: Evidence, config: KinConfig) -> tuple[Array, Array]:
     """Metres (n,) by which points (n, 3), frame of the plane, stand in space that was seen to be
@@ -28,7 +24,7 @@ def ways_out(points: Array, evidence: Evidence, config: KinConfig) -> tuple[Arra
     seen: Array = np.asarray(transform_points(T_cam_plane, points), dtype=np.float64)
     free = np.flatnonzero(_gap(seen, evidence) > config.tolerance)
     if len(free):
-        back, aside = _back(seen[free], evidence), _aside(seen[free], evidence)
+        back, aside = _back(seen[free], evidence), _aside(seen[free], evidence, config)
         deep = back[0] - config.tolerance
         nearer = aside[0] < deep
         length = np.where(nearer, aside[0], deep)
@@ -49,13 +45,14 @@ def _back(points: Array, evidence: Evidence) -> tuple[Array, Array]:
     return _gap(points, evidence) / ray[:, 2], ray
 
 
-def _aside(points: Array, evidence: Evidence) -> tuple[Array, Array]:
+def _aside(points: Array, evidence: Evidence, config: KinConfig) -> tuple[Array, Array]:
     """Lengths, infinite where there is no such way, and directions across the image."""
-    angle = 2 * np.pi / DIRECTIONS * np.arange(DIRECTIONS)
-    directions = np.stack([np.cos(angle), np.sin(angle), np.zeros(DIRECTIONS)], axis=1)
-    steps = LENGTHS[:, None, None] * directions
+    angle = 2 * np.pi / config.aside_directions * np.arange(config.aside_directions)
+    directions = np.stack([np.cos(angle), np.sin(angle), np.zeros_like(angle)], axis=1)
+    reach = np.geomspace(*config.aside, config.aside_steps)
+    steps = reach[:, None, None] * directions
     tried = points[:, None, None] + steps
     out = _gap(tried.reshape(-1, 3), evidence).reshape(tried.shape[:-1]) <= 0
-    lengths = np.where(out, LENGTHS[:, None], np.inf).min(axis=1)
+    lengths = np.where(out, reach[:, None], np.inf).min(axis=1)
     best = lengths.argmin(axis=1)
     return lengths.min(axis=1), directions[best]

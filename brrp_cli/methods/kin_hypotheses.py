@@ -82,10 +82,13 @@ def kin_hypotheses(
     ]
     cost = np.array([each.cost for each in found])
     together = shares[shares >= kin.least_share].sum()
-    relative = bent_shares(cost, library.hollow[fits.placements.stance[chosen]], into, kin)
+    hollow = library.hollow[fits.placements.stance[chosen]]
+    relative = bent_shares(cost, hollow, into, kin)
     return [
-        _hypothesis(name, int(row), each, float(share), fits, evidence, library, config)
-        for name, row, each, share in zip(names, chosen, found, together * relative, strict=True)
+        _hypothesis(name, each, float(share), float(walls), evidence, config)
+        for name, each, share, walls in zip(
+            names, found, together * relative, _walls(hollow, kin), strict=True
+        )
         if share >= kin.least_share
     ]
 
@@ -162,15 +165,14 @@ def _distinct(fits: Fits, library: Library, config: KinConfig) -> NDArray[np.int
 
 def _hypothesis(
     name: str,
-    row: int,
     bent: BentShape,
     share: float,
-    fits: Fits,
+    walls: float,
     evidence: Evidence,
-    library: Library,
     config: HypothesesConfig,
 ) -> KinHypothesis:
-    kin, stance = config.kin, fits.placements.stance[[row]]
+    """walls : from 0, a solid, to 1, a hollow thing"""
+    kin = config.kin
     shape = bent.shape(kin)
     off = shape.distance(transform_points(np.linalg.inv(bent.T_plane_shape), evidence.seen))
     near = np.exp(-0.5 * np.square(off) / (kin.near**2 + evidence.noise**2)).mean()
@@ -183,7 +185,7 @@ def _hypothesis(
         # How far the shape is off says its width; the place is part of it.
         np.zeros((6, 6)),
         kin=True,
-        exact=kin.exact if _walls(library.hollow[stance], kin)[0] > 0 else 0.0,
+        exact=kin.exact if walls > 0 else 0.0,
     )
     x, y, z = (float(s) for s in bent.fit.half / bent.fit.stored_half)
     return KinHypothesis(placed, share, (x, y, z))

@@ -15,9 +15,6 @@ from brrp_cli.inference.placed_shape import PlacedShape
 
 Array = NDArray[np.float64]
 
-# Radians: axes of turns within it of each other are one.
-ONE_AXIS = 0.25
-
 
 def every_alike(shape: PlacedShape, config: SurfaceConfig) -> Array:
     """(K, 4, 4) T_cam_shape of the placements that are as probable as the shape's own, and of those
@@ -40,8 +37,8 @@ def _free_turns(shape: PlacedShape, config: SurfaceConfig) -> Array:
     angles = np.linalg.norm(vectors, axis=1)
     axes = vectors / angles[:, None]
     cosine = np.abs(axes @ axes.T)
-    common = int(np.argmax((cosine > np.cos(ONE_AXIS)).sum(axis=1)))
-    same = cosine[common] > np.cos(ONE_AXIS)
+    common = int(np.argmax((cosine > np.cos(config.one_axis)).sum(axis=1)))
+    same = cosine[common] > np.cos(config.one_axis)
     about = np.sort(np.append(angles[same] * np.sign(axes[same] @ axes[common]), 0.0))
     gaps = np.diff(np.append(about, about[0] + 2 * np.pi))
     if same.sum() < config.free_turns or gaps.min() > config.neighbours:
