@@ -52,7 +52,8 @@ from brrp_cli.errors import BrrpError, SceneError
 CHECK_EVERY = 5
 
 
-def _prefixes(_context: click.Context, _option: click.Parameter, value: str) -> tuple[str, ...]:
+def prefixes(_context: click.Context, _option: click.Parameter, value: str) -> tuple[str, ...]:
+    """The names, or beginnings of names, of an option that lists them."""
     return tuple(part.strip() for part in value.split(",") if part.strip())
 
 
@@ -65,8 +66,8 @@ def _size(_context: click.Context, _option: click.Parameter, value: str) -> tupl
 
 @click.command()
 @click.option("--meshes", type=click.Path(path_type=Path), help="Folder of meshes, metres.")
-@click.option("--only", default="", callback=_prefixes, help="Names to take, as in 030,065-b.")
-@click.option("--skip", default="", callback=_prefixes, help="Names to leave out.")
+@click.option("--only", default="", callback=prefixes, help="Names to take, as in 030,065-b.")
+@click.option("--skip", default="", callback=prefixes, help="Names to leave out.")
 @click.option(
     "--held-out",
     default=MIXED,

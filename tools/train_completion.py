@@ -86,7 +86,7 @@ def main(
 ) -> None:
     """Train on SETS, SCENES:DATA_ROOT[:measured], or on the examples that are in OUTPUT already."""
     from training.completion import Training, TrainingConfig, resumed, scores, started
-    from training.completion_examples import Wanted, held_names, make_all, read_examples
+    from training.completion_examples import Wanted, held_names, make_all, names_in, read_examples
 
     from brrp_cli.completion.shape_network import ShapeNetworkConfig
 
@@ -114,10 +114,9 @@ def main(
         if examples_only:
             click.echo(f"Examples of {len(paths)} views: {folder}/")
             return
-        every = read_examples(paths)
-        kept = held_names(every.names, validation, seed)
-        of_held = np.array([name in kept for name in every.names])
-        train, held = (every.only(np.flatnonzero(which)) for which in (~of_held, of_held))
+        kept = held_names(names_in(paths), validation, seed)
+        train = read_examples(paths, lambda name: name not in kept)
+        held = read_examples(paths, lambda name: name in kept)
         if not len(train) or not len(held):
             raise BrrpError(
                 "There is too little to train on or to validate with",
@@ -125,7 +124,6 @@ def main(
                 found=f"{len(train)} and {len(held)} objects",
                 fix="make more scenes",
             )
-        del every
         config = TrainingConfig(
             epochs=epochs, cooling=cooling, batch=batch, rate=rate, seed=seed, points=points
         )

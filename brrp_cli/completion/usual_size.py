@@ -17,15 +17,16 @@ def of_usual_size(part: VisiblePart) -> tuple[VisiblePart, float]:
     """An object that looks the same and is no larger than `config.largest`, and how many times its
     lengths are those of `part`: 1 at most."""
     scale = part.config.largest / part.size
-    if scale >= 1:
-        return part, 1.0
+    return (part, 1.0) if scale >= 1 else (resized(part, scale), scale)
+
+
+def resized(part: VisiblePart, scale: float) -> VisiblePart:
+    """What would be seen of an object, and of all around it, with `scale` times all lengths."""
     points = part.frame.points * np.float32(scale)
-    plane = part.plane and replace(part.plane, offset=part.plane.offset * scale)
-    smaller = visible_part(
+    return visible_part(
         (part.seen * scale).astype(np.float32),
         replace(part.frame, points=points, T_world_cam=None),
         part.object_id,
-        plane,
+        part.plane and replace(part.plane, offset=part.plane.offset * scale),
         part.config,
     )
-    return smaller, scale

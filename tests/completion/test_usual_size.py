@@ -10,7 +10,7 @@ import pytest
 from table_scene import TABLE, in_camera, photograph, placed
 
 from brrp_cli.completion.completed_mean import network_grid
-from brrp_cli.completion.usual_size import of_usual_size
+from brrp_cli.completion.usual_size import of_usual_size, resized
 from brrp_cli.completion.visible_part import visible_part
 from brrp_cli.config import preset
 from brrp_cli.inference.mean_grid import grid_over
@@ -42,6 +42,16 @@ def test_a_large_one_is_looked_at_as_one_of_the_usual_size():
     assert smaller.size == pytest.approx(CONFIG.completion.largest, rel=0.06)
     assert scale == pytest.approx(CONFIG.completion.largest / part.size)
     assert smaller.top == pytest.approx(part.top * scale, rel=0.06)
+
+
+def test_what_is_resized_looks_as_if_all_lengths_were_others():
+    part, larger = seen(1.0, CONFIG.completion), seen(1.5, CONFIG.completion)
+    found = resized(part, 1.5)
+    # Points are thinned at the size that they have first.
+    assert found.size == pytest.approx(larger.size, rel=0.06)
+    assert found.top == pytest.approx(larger.top, rel=0.06)
+    assert found.plane.offset == pytest.approx(larger.plane.offset)
+    np.testing.assert_array_equal(found.silhouette, larger.silhouette)
 
 
 @pytest.mark.parametrize("times", [2.0, 4.0])

@@ -13,7 +13,7 @@ from tiny_scenes import write_meshes, write_scene
 from train_completion import main
 from training import completion_examples
 from training.completion import ShapeNetworkConfig, draw_batch, scores, started
-from training.completion_examples import Wanted, held_names, make_view, read_examples
+from training.completion_examples import Wanted, held_names, make_view, names_in, read_examples
 
 from brrp_cli.completion.learned import load_shapes
 from brrp_cli.completion.network import fitted
@@ -59,10 +59,22 @@ def test_examples_are_labelled_points_in_volumes(place):
     assert len(found.lengths) == len(found.places) == len(found.inside) == found.starts[-1]
     assert 0.1 < found.inside.mean() < 0.9
     assert np.isfinite(found.lengths.astype(float)).all()
-    one = found.only(np.array([1]))
-    assert one.names == found.names[1:2] and len(one.inside) == np.diff(found.starts)[1]
     # What is inside lies in the middle of the volume, and what does not, around it.
-    assert np.abs(one.places[one.inside].astype(float)).max() < 1.2
+    assert np.abs(found.places[found.inside].astype(float)).max() < 1.2
+
+
+def test_examples_of_some_shapes_alone(place):
+    paths = sorted((place / "made" / "examples").glob("*/*.npz"))
+    every = read_examples(paths)
+    assert names_in(paths) == list(every.names)
+    row = every.names.index("ball")
+    own = slice(every.starts[row], every.starts[row + 1])
+    ball = read_examples(paths, lambda name: name == "ball")
+    assert ball.names == ("ball",) and ball.starts.tolist() == [0, own.stop - own.start]
+    np.testing.assert_array_equal(ball.volumes[0], every.volumes[row])
+    np.testing.assert_array_equal(ball.lengths, every.lengths[own])
+    np.testing.assert_array_equal(ball.places, every.places[own])
+    np.testing.assert_array_equal(ball.inside, every.inside[own])
 
 
 def test_it_begins_as_the_network_of_lengths(place):
@@ -107,6 +119,15 @@ def test_shapes_are_kept_by_name():
     kept = held_names(names + names, 0.1, 0)
     assert 20 < len(kept) < 60 and kept < set(names)
     assert held_names(names[:50], 0.1, 0) == kept & set(names[:50])
+
+
+def test_a_stretched_shape_is_kept_with_the_shape():
+    names = [f"shape {i}" for i in range(100)]
+    stretched = [f"{name}~{copy}" for name in names for copy in (1, 2)]
+    kept = held_names(names + stretched, 0.1, 0)
+    assert {name for name in kept if "~" in name} == {
+        f"{name}~{copy}" for name in kept & set(names) for copy in (1, 2)
+    }
 
 
 def test_goes_on_from_the_weights_of_another_training(place, tmp_path):

@@ -11,7 +11,7 @@ One file for each view of a scene, SET/NAME_VIEW.npz, of its N objects:
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from io import BytesIO
 from pathlib import Path
@@ -23,6 +23,7 @@ from scipy.ndimage import binary_dilation
 
 from brrp_cli.completion.completed_mean import empty_space
 from brrp_cli.completion.point_features import COUNT, point_features
+from brrp_cli.completion.usual_size import resized
 from brrp_cli.completion.visible_part import visible_part
 from brrp_cli.completion.volume import CHANNELS, volume_of
 from brrp_cli.config import HypothesesConfig, preset
@@ -43,6 +44,11 @@ ALBEDO = (0.2, 0.9)  # of everything in the frame, what it shows to an infrared 
 # Masks as they are, moved aside or grown, and by how many pixels.
 SHIFTED, GROWN, PIXELS = 0.15, 0.15, 2
 DRAWS = 2  # of the points that an object is asked at
+# A camera cannot tell a large thing far away from a small one near: how many are looked at as if
+# all lengths were others, and how many times.
+RESIZED, TIMES = 0.5, (0.6, 1.8)
+# What a stretched shape's name adds to that of the shape.
+STRETCHED = "~"
 
 
 @dataclass(frozen=True)
@@ -58,19 +64,6 @@ class Examples:
 
     def __len__(self) -> int:
         return len(self.volumes)
-
-    def only(self, rows: NDArray[np.int64]) -> Examples:
-        """The objects `rows`."""
-        spans = [np.arange(self.starts[i], self.starts[i + 1]) for i in rows]
-        points = np.concatenate([np.zeros(0, np.int64), *spans])
-        return Examples(
-            self.volumes[rows],
-            self.lengths[points],
-            self.places[points],
-            self.inside[points],
-            np.cumsum([0, *(len(span) for span in spans)]),
-            tuple(self.names[i] for i in rows),
-        )
 
 
 @dataclass(frozen=True)
@@ -121,13 +114,17 @@ def view_examples(
         solid = solid_of(true.mesh_path, data_root)
         if solid is None:
             continue
-        part = visible_part(cloud, frame, object_id, plane, hypotheses.completion)
+        part, times = visible_part(cloud, frame, object_id, plane, hypotheses.completion), 1.0
+        if rng.random() < RESIZED:
+            times = float(np.exp(rng.uniform(*np.log(TIMES))))
+            part = resized(part, times)
         points = np.concatenate([asked_points(part, rng) for _ in range(DRAWS)])
-        points = points[~empty_space(points, frame, object_id, plane, hypotheses.mean)]
+        points = points[~empty_space(points, part.frame, object_id, part.plane, hypotheses.mean)]
         if not len(points):
             continue
         volume = volume_of(part, hypotheses.completion.volume)
-        in_file = transform_points(np.linalg.inv(true.T_world_object) @ T_world_cam, points)
+        T_file_cam = np.linalg.inv(true.T_world_object) @ T_world_cam
+        in_file = transform_points(T_file_cam, points / times)
         found.append(
             (
                 volume.values,
@@ -192,24 +189,48 @@ def _side() -> int:
     return HypothesesConfig().completion.volume.side
 
 
-def read_examples(paths: Sequence[Path]) -> Examples:
-    """The examples of all files, one after the other."""
-    arrays: dict[str, list] = {}
+def names_in(paths: Sequence[Path]) -> list[str]:
+    """Names of the objects of all files, one after the other."""
+    found = []
     for path in paths:
         with np.load(path, allow_pickle=False) as file:
-            for name in file.files:
-                arrays.setdefault(name, []).append(file[name])
-    joined = {}
-    for name in list(arrays):
-        joined[name] = np.concatenate(arrays.pop(name))
-    return Examples(
-        joined["volumes"],
-        joined["lengths"],
-        joined["places"],
-        joined["inside"],
-        np.concatenate([[0], np.cumsum(joined["counts"])]),
-        tuple(str(name) for name in joined["names"]),
+            found += [str(name) for name in file["names"]]
+    return found
+
+
+def read_examples(
+    paths: Sequence[Path], wanted: Callable[[str], bool] = lambda name: True
+) -> Examples:
+    """The examples of all files, one after the other, of objects whose name is `wanted`: in place,
+    since they may fill half of the memory."""
+    names, counts = [], []
+    for path in paths:
+        with np.load(path, allow_pickle=False) as file:
+            mine = [bool(wanted(str(name))) for name in file["names"]]
+            names += [str(name) for name in file["names"][mine]]
+            counts += file["counts"][mine].tolist()
+    starts = np.concatenate([np.zeros(1, np.int64), np.cumsum(counts, dtype=np.int64)])
+    side, points = _side(), int(starts[-1])
+    found = Examples(
+        np.empty((len(names), CHANNELS, side, side, side), np.int8),
+        np.empty((points, COUNT), np.float16),
+        np.empty((points, 3), np.float16),
+        np.empty(points, bool),
+        starts,
+        tuple(names),
     )
+    objects = begin = 0
+    for path in paths:
+        with np.load(path, allow_pickle=False) as file:
+            mine = np.array([bool(wanted(str(name))) for name in file["names"]], dtype=bool)
+            of_mine = np.repeat(mine, file["counts"])
+            found.volumes[objects : objects + mine.sum()] = file["volumes"][mine]
+            own = slice(begin, begin + int(of_mine.sum()))
+            found.lengths[own] = file["lengths"][of_mine]
+            found.places[own] = file["places"][of_mine]
+            found.inside[own] = file["inside"][of_mine]
+            objects, begin = objects + int(mine.sum()), own.stop
+    return found
 
 
 def make_all(every: Sequence[Wanted], seed: int, folder: Path) -> Iterator[Path]:
@@ -224,7 +245,11 @@ def make_all(every: Sequence[Wanted], seed: int, folder: Path) -> Iterator[Path]
 
 
 def held_names(names: Sequence[str], share: float, seed: int) -> frozenset[str]:
-    """Shapes that are kept to validate: whether one is depends on its name and the seed alone."""
-    return frozenset(
-        name for name in set(names) if child_rng(seed, "validation", name).random() < share
-    )
+    """Shapes that are kept to validate: whether one is depends on its name and the seed alone. A
+    stretched shape is kept when the shape is."""
+
+    def kept(name: str) -> bool:
+        shape = name.partition(STRETCHED)[0]
+        return bool(child_rng(seed, "validation", shape).random() < share)
+
+    return frozenset(name for name in set(names) if kept(name))

@@ -70,7 +70,8 @@ def _tidy(mesh: trimesh.Trimesh) -> tuple[trimesh.Trimesh, list[str]]:
     before = len(mesh.faces)
     mesh.update_faces(_faces_that_count(mesh.faces))
     mesh.remove_unreferenced_vertices()
-    if len(mesh.faces) == 0:
+    # Faces in one line enclose nothing either, and pymeshlab ends the process on them.
+    if not mesh.area > 0:
         raise MeshError("The mesh encloses nothing", found=f"{before} faces, all of them needles")
     if len(mesh.faces) < before:
         steps.append(f"dropped {before - len(mesh.faces)} degenerate or duplicate faces")

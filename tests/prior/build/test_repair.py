@@ -150,8 +150,10 @@ def test_rims_are_told_apart() -> None:
 
 def test_what_encloses_nothing_is_refused() -> None:
     needles = triangles(np.eye(4, 3) * 0.1, np.array([[0, 1, 1], [0, 2, 2]]))
-    with pytest.raises(MeshError, match="encloses nothing"):
-        repair(needles)
+    in_a_line = triangles(np.eye(1, 3) * [[0.0], [0.1], [0.2]], np.array([[0, 1, 2]]))
+    for mesh in (needles, in_a_line):
+        with pytest.raises(MeshError, match="encloses nothing"):
+            repair(mesh)
 
 
 def test_edges_that_no_split_parts_do_not_stop_the_filling_of_holes() -> None:
