@@ -29,7 +29,7 @@ import sys
 from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
-from functools import cache, partial
+from functools import cache, lru_cache, partial
 from io import BytesIO
 from multiprocessing import get_context
 from pathlib import Path
@@ -94,7 +94,8 @@ def _hypotheses() -> HypothesesConfig:
     return found
 
 
-@cache
+# Open3D ends the process where more than a thousand scenes are kept.
+@lru_cache(maxsize=256)
 def solid_of(mesh_path: str, data_root: Path) -> Any:
     """A ray casting scene with the object's closed mesh, metres, in the frame of its file; None for
     a mesh that cannot be closed."""

@@ -28,7 +28,8 @@ class GraspConfig:
     approach : straight way in, from the pre-grasp
     table_gap : least height over the table, some standard deviations of where the hand gets to;
     inset : by which the boxes of the hand are smaller
-    where they are held against the object and its neighbours, which were measured with noise
+    where they are held against neighbours, which were measured with noise; grazes : by which they
+    are where they are held against the object itself, which they push aside by so much
 
     Score
     draws : of the object's surface from its posterior, and of where the hand gets to; as many as
@@ -65,6 +66,7 @@ class GraspConfig:
     approach: float = 0.1
     table_gap: float = 0.003
     inset: float = 0.0005
+    grazes: float = 0.0025
     draws: int = 24
     surfaces: int = 12
     accuracy: float = 0.001
@@ -75,7 +77,7 @@ class GraspConfig:
     around: float = 0.03
     pad_rows: int = 5
     pad_columns: int = 3
-    yields: float = 0.0015
+    yields: float = 0.005
     confidence: float = share(0.9)
     neighbour_nodes: int = 150_000
     loose: int = 2_000

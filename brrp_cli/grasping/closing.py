@@ -4,12 +4,13 @@ On its way in the hand must not touch the object: rays along the approach find w
 the palm would run into. Then the fingers close: rays from their inner faces find what each meets
 first, and what lies so little behind that it touches too. The grasp holds where the line between
 the middles of the two contacts lies inside the friction cones of both, and so does the direction in
-which the fingers press.
+which the fingers press. Further outside it holds the less probably: what is held askew turns until
+it lies flat between the fingers, or slips out.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,8 +28,8 @@ Flags = NDArray[np.bool_]
 class Closed:
     """For each draw and hand, (S, n).
 
-    collides : the open hand touches the object on its way in; misses : a finger meets nothing;
-    slips : both meet the object, and friction does not hold it
+    collides : the open hand runs into the object on its way in; misses : a finger meets nothing
+    slips : how probably friction does not hold an object that both fingers meet
     contacts : (S, n, 2, 3), middles of the contacts, gripper's frame, NaN where there are none
     touching : share of the fingers' faces that touch; margin : cosine of the worst angle to a
     contact's normal
@@ -36,15 +37,15 @@ class Closed:
 
     collides: Flags
     misses: Flags
-    slips: Flags
+    slips: Array
     contacts: Array
     touching: Array
     margin: Array
 
     @property
-    def holds(self) -> Flags:
-        """(S, n): none of these goes wrong."""
-        return np.asarray(~(self.collides | self.misses | self.slips))
+    def holds(self) -> Array:
+        """(S, n) how probably none of these goes wrong."""
+        return np.where(self.collides | self.misses, 0.0, 1 - self.slips)
 
 
 def close_on(
@@ -61,8 +62,12 @@ def close_on(
     """
     T = _placed(surfaces, T_cam_gripper, off)
     press, side = _closing_rays(openings, gripper, config)
-    hit, normals = _cast(surfaces, T, press, side)
-    collides = runs_into(surfaces, T_cam_gripper, openings, gripper, config, off)
+    # What a finger only grazes is pushed aside: it may lie a little within the open finger.
+    hit, normals = _cast(surfaces, T, press - config.grazes * side, side)
+    hit = hit - config.grazes
+    collides = runs_into(
+        surfaces, T_cam_gripper, openings, gripper, replace(config, inset=config.grazes), off
+    )
     return _pressed(hit, normals, press, openings, collides, config)
 
 
@@ -136,11 +141,11 @@ def _pressed(
         ]
     )
     margin = np.where(misses, -1.0, angles.min(axis=0))
-    slips = ~misses & (margin < np.cos(np.arctan(config.friction)))
+    outside = 1 - np.clip(margin / np.cos(np.arctan(config.friction)), 0, 1)
     return Closed(
         collides,
         misses & ~collides,
-        slips & ~collides,
+        np.where(misses | collides, 0.0, outside),
         np.where(misses[..., None, None], np.nan, contacts),
         touches.mean(axis=(-1, -2)),
         margin,

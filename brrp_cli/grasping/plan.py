@@ -173,11 +173,11 @@ def _most_promising(
     closed = close_on(mesh_alone(own), poses.T, poses.openings, gripper, config)
     holds = closed.holds[0]
     quality = _quality(poses, closed, item, config)
-    # Deepest of those that hold, in each family; if none does, the deepest.
-    rank = np.lexsort([poses.order, ~holds, poses.family])
+    # Deepest of those that may hold, in each family; if none does, the deepest.
+    rank = np.lexsort([poses.order, holds == 0, poses.family])
     first = np.unique(poses.family[rank], return_index=True)[1]
     best = rank[first]
-    order = np.lexsort([-quality[best], ~holds[best]])
+    order = np.lexsort([-quality[best], -holds[best]])
     chosen = best[order][: config.candidates]
     fell["not_tried"] = len(poses) - len(chosen)
     return poses.take(chosen)
@@ -186,14 +186,14 @@ def _most_promising(
 def _quality(poses: Poses, closed: Closed, item: GraspObject, config: GraspConfig) -> Array:
     """(n,) in [0, 1], what friction, contact and lever leave: how far inside the friction cone, how
     much of the fingers touches, how close the closing axis passes the object's middle; means over
-    the draws in which it holds, 0 where there is none."""
-    good = closed.holds
-    count = np.maximum(good.sum(axis=0), 1)
+    the draws by how probably it holds in each, 0 where it holds in none."""
+    holds = closed.holds
+    count = np.maximum(holds.sum(axis=0), 1e-9)
     least = np.cos(np.arctan(config.friction))
     inside = np.clip((closed.margin - least) / (1 - least), 0, 1)
     # A quarter of the faces is a good contact already.
     touching = np.minimum(closed.touching * 4, 1)
-    value = np.where(good, (0.5 + 0.5 * inside) * (0.5 + 0.5 * touching), 0).sum(axis=0) / count
+    value = (holds * (0.5 + 0.5 * inside) * (0.5 + 0.5 * touching)).sum(axis=0) / count
     middle = _centre(item)
     x, centre = poses.T[:, :3, 0], poses.contacts.mean(axis=1)
     aside = middle - centre
@@ -245,7 +245,7 @@ def _ranked(
     """The best grasps that are far enough from each other and that no neighbour is in the way of,
     exactly."""
     config, item = task.config, task.item
-    score = (closed.holds & ~low).mean(axis=0)
+    score = (closed.holds * ~low).mean(axis=0)
     quality = _quality(poses, closed, item, config)
     enough = score >= max(task.min_score, 1e-9)
     causes = {
@@ -277,7 +277,7 @@ def _ranked(
 def _grasp(
     item: GraspObject, poses: Poses, closed: Closed, i: int, score: float, quality: float
 ) -> Grasp:
-    good = closed.holds[:, i]
+    good = closed.holds[:, i] > 0
     local = np.median(closed.contacts[good, i], axis=0)
     return Grasp(
         item.object_id,

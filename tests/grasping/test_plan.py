@@ -12,7 +12,7 @@ from made_result import posterior_on
 from brrp_cli.config import SurfaceConfig
 from brrp_cli.config.grasping import GraspConfig
 from brrp_cli.errors import BrrpError
-from brrp_cli.grasping.closing import close_on
+from brrp_cli.grasping.closing import Closed, close_on
 from brrp_cli.grasping.draws import Mesh, draw_surfaces, mesh_alone
 from brrp_cli.grasping.gripper_file import open_gripper
 from brrp_cli.grasping.obstacles import Obstacles
@@ -131,8 +131,8 @@ def test_what_rays_miss_is_found_exactly():
     assert not around.hits(T, 0.06, FRANKA, config)
 
 
-@pytest.mark.parametrize(("lean", "friction"), [(20, 0.5), (35, 0.5), (35, 0.9), (50, 0.9)])
-def test_a_wedge_slips_where_its_sides_lean_further_than_the_friction_cone(lean, friction):
+def closed_on_a_wedge(lean: float, friction: float) -> Closed:
+    """On sides that lean by so many degrees."""
     block = solids.box(0.01, 0.04, 0.06)
     vertices = np.asarray(block.vertices).copy()
     vertices[:, 0] += np.sign(vertices[:, 0]) * (0.06 - vertices[:, 2]) * np.tan(np.deg2rad(lean))
@@ -140,10 +140,31 @@ def test_a_wedge_slips_where_its_sides_lean_further_than_the_friction_cone(lean,
     T = np.diag([1.0, -1.0, -1.0, 1.0])
     T[2, 3] = FRANKA.tip + 0.035
     config = GraspConfig(friction=friction)
-    found = close_on(mesh_alone(wedge), T[None], np.array([0.08]), FRANKA, config)
-    holds = np.tan(np.deg2rad(lean)) < friction
-    assert bool(found.holds[0, 0]) == holds and bool(found.slips[0, 0]) != holds
+    return close_on(mesh_alone(wedge), T[None], np.array([0.08]), FRANKA, config)
+
+
+@pytest.mark.parametrize(("lean", "friction"), [(20, 0.5), (35, 0.5), (35, 0.9), (50, 0.9)])
+def test_a_wedge_holds_surely_within_the_friction_cone_and_less_outside(lean, friction):
+    found = closed_on_a_wedge(lean, friction)
     assert found.margin[0, 0] == pytest.approx(np.cos(np.deg2rad(lean)), abs=1e-3)
+    edge = np.cos(np.arctan(friction))
+    expected = min(1.0, np.cos(np.deg2rad(lean)) / edge)
+    assert found.holds[0, 0] == pytest.approx(expected, abs=2e-3)
+    assert found.slips[0, 0] == pytest.approx(1 - expected, abs=2e-3)
+
+
+def test_a_finger_that_grazes_a_box_pushes_it_aside():
+    """The left finger comes down over the edge of a box by so much."""
+    box = trimesh.creation.box((0.05, 0.04, 0.06))
+    mesh = Mesh(np.asarray(box.vertices), np.asarray(box.faces, dtype=np.int64))
+    T = np.diag([1.0, -1.0, -1.0, 1.0])
+    T[2, 3] = FRANKA.tip + 0.01
+    config = GraspConfig()
+    for over, held in ((0.8 * config.grazes, True), (1.2 * config.grazes, False)):
+        T[0, 3] = 0.005 + over
+        found = close_on(mesh_alone(mesh), T[None], np.array([0.06]), FRANKA, config)
+        assert bool(found.collides[0, 0]) != held
+        assert found.holds[0, 0] == pytest.approx(float(held))
 
 
 def uncertain(width: float) -> GraspObject:
