@@ -45,8 +45,8 @@ class GraspConfig:
     `SurfaceConfig.around_nodes` takes six times as long and lies 0.03 mm further out on average
     loose : observed points of objects without a mesh that the hand keeps out of, at most
     friction : Coulomb's coefficient between fingers and object
-    lever : distance of the closing axis from the object's centre over which a grasp's quality,
-    which ranks those with the same score, falls to a third
+    lever : distance of the closing axis from the object's centre over which a grasp's quality falls
+    to a third; taste : power of the quality beside the score in what grasps are ranked by
     apart, apart_angle : of two grasps with the same object one is left out that is nearer
     """
 
@@ -83,5 +83,6 @@ class GraspConfig:
     loose: int = 2_000
     friction: float = 0.5
     lever: float = 0.05
+    taste: float = 0.2
     apart: float = 0.01
     apart_angle: float = between(20.0, 0.0, 180.0)

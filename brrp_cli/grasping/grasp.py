@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +12,7 @@ from brrp_cli.config.grasping import GraspConfig
 from brrp_cli.grasping.gripper import Gripper
 
 Array = NDArray[np.float64]
+Reals = TypeVar("Reals", float, Array)
 
 
 @dataclass(frozen=True)
@@ -19,7 +21,7 @@ class Grasp:
 
     T_cam_gripper : (4, 4), the gripper's frame (brrp_cli/grasping/gripper.py) in the camera's
     opening : metres between the fingers on the way in; width : between them when they hold
-    score : probability that it holds; quality : in [0, 1], ranks grasps with the same score
+    score : probability that it holds; quality : in [0, 1], ranks grasps with nearly the same score
     contacts : (2, 3) metres, camera frame, the left finger's (at -x) first
     """
 
@@ -59,4 +61,10 @@ class GraspPlan:
     def grasps(self) -> list[Grasp]:
         """All, best first."""
         every = [grasp for each in self.objects for grasp in each.grasps]
-        return sorted(every, key=lambda grasp: (-grasp.score, -grasp.quality))
+        return sorted(every, key=lambda each: -worth(each.score, each.quality, self.config))
+
+
+def worth(score: Reals, quality: Reals, config: GraspConfig) -> Reals:
+    """What grasps are ranked by: the score, which a few draws tell roughly, and a little of the
+    quality, which knows of levers."""
+    return score * quality**config.taste

@@ -18,7 +18,7 @@ from brrp_cli.geometry import transform_points
 from brrp_cli.grasping.candidates import Poses, antipodal_pairs, comes_from, hand_poses, lifted_off
 from brrp_cli.grasping.closing import Closed, close_on
 from brrp_cli.grasping.draws import Mesh, SurfaceDraws, draw_surfaces, mesh_alone
-from brrp_cli.grasping.grasp import Grasp, GraspPlan, ObjectGrasps
+from brrp_cli.grasping.grasp import Grasp, GraspPlan, ObjectGrasps, worth
 from brrp_cli.grasping.gripper import Gripper
 from brrp_cli.grasping.gripper_file import DEFAULT, open_gripper
 from brrp_cli.grasping.obstacles import Obstacles
@@ -260,7 +260,7 @@ def _ranked(
         fell[why] = fell.get(why, 0) + int((~enough & (worst == i)).sum())
     fell |= {"similar": 0, "more": 0}
     grasps: list[Grasp] = []
-    for i in np.lexsort([-quality, -score]):
+    for i in np.argsort(-worth(score, quality, config), kind="stable"):
         if not enough[i]:
             continue
         if len(grasps) == task.per_object:
