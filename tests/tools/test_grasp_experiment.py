@@ -149,11 +149,14 @@ def test_the_report_counts_what_was_carried_out():
     rows.append(common | {"method": "mean mesh", "result": HELD, "rank": 2})
     rows.append(common | {"method": "default", "result": HELD, "rank": "drawn"})
     rows.append(common | {"method": "default", "result": "none", "score": None, "drift": None})
+    # A scene that one method alone has tried is in its own row, not in the comparison.
+    rows.append(common | {"method": "vprism", "result": HELD})
     told = report(rows, drift=0.005)
-    assert "| default | prior | 90% (70% to 100%), 10 | 90% (70% to 100%), 10 | 10 of 11 |" in told
-    assert "| mean mesh | prior | 55% (" in told
-    assert "), 11 | 50% (20% to 80%), 10 | 10 of 10 |" in told
+    assert "| default | prior | 90% (70% to 100%), 10 | 90% (70% to 100%), 10 | 82% (" in told
+    assert "), 11 |\n| mean mesh | prior | 55% (" in told
+    assert "), 11 | 50% (20% to 80%), 10 | 50% (20% to 80%), 10 |" in told
     assert "| default | 10 | 9 (70% to 100%) | 0 | 0 | 0 | 0 | 1 (0% to 30%) | 0 |" in told
-    assert "| mean mesh | prior | +35% (" in told
+    assert "| mean mesh | prior | +35% (" in told and ") | +32% (" in told
+    assert "| vprism | prior | +0% | -50% |" in told
     assert "| 0.9 to 0.97 | 11 | 0.90 | 91%" in told and "calibration error: 0.01" in told
     assert "10 objects of which both plan a grasp: +40%" in told

@@ -43,10 +43,18 @@ def _chosen(rows: Sequence[Row], **which: str) -> list[Row]:
     ]
 
 
+def _tried(rows: Sequence[Row]) -> list[Row]:
+    return [row for row in rows if row["result"] != "none"]
+
+
+def _first(rows: Sequence[Row]) -> list[Row]:
+    """One row for each object, of its best grasp or of none."""
+    return [row for row in rows if row["rank"] == 1]
+
+
 def _held(rows: Sequence[Row], rng: np.random.Generator) -> Interval:
-    tried = [row for row in rows if row["result"] != "none"]
-    held = [float(row["result"] == HELD) for row in tried]
-    return mean_interval(held, [row["scene"] for row in tried], rng)
+    held = [float(row["result"] == HELD) for row in rows]
+    return mean_interval(held, [row["scene"] for row in rows], rng)
 
 
 def _told(found: Interval) -> str:
@@ -64,16 +72,16 @@ def _success(
     rows: Sequence[Row], sets: list[str], methods: list[str], rng: np.random.Generator
 ) -> str:
     lines = [
-        "| method | set | held (95 %), grasps | first of each object | objects with a grasp |",
+        "| method | set | held (95 %), grasps | first of each object | held by their first,"
+        " of all objects |",
         "| --- | --- | --- | --- | --- |",
     ]
     for method in methods:
         for name in sets:
             mine = _chosen(rows, method=method, set=name)
-            first = [row for row in mine if row["rank"] == 1]
-            some = sum(row["result"] != "none" for row in first)
-            both = f"{_told(_held(mine, rng))} | {_told(_held(first, rng))}"
-            lines.append(f"| {method} | {name} | {both} | {some} of {len(first)} |")
+            shares = [_tried(mine), _tried(_first(mine)), _first(mine)]
+            cells = " | ".join(_told(_held(each, rng)) for each in shares)
+            lines.append(f"| {method} | {name} | {cells} |")
     return "\n".join(lines)
 
 
@@ -84,7 +92,7 @@ def _failures(rows: Sequence[Row], methods: list[str], rng: np.random.Generator)
         "| --- | --- |" + " --- |" * len(OUTCOMES),
     ]
     for method in methods:
-        tried = [row for row in _chosen(rows, method=method) if row["result"] != "none"]
+        tried = _tried(_chosen(rows, method=method))
         scenes = [row["scene"] for row in tried]
         cells = []
         for outcome in OUTCOMES:
@@ -98,28 +106,35 @@ def _failures(rows: Sequence[Row], methods: list[str], rng: np.random.Generator)
 def _against(
     rows: Sequence[Row], sets: list[str], methods: list[str], rng: np.random.Generator
 ) -> str:
-    """By how much a larger share of the grasps of `default` held than of another method's, drawn by
-    scene."""
-    lines = ["| default against | set | more held (95 %) |", "| --- | --- | --- |"]
+    """By how much a larger share of the grasps of `default` held than of another method's, and of
+    all objects by their first grasp, drawn by scene."""
+    lines = [
+        "| default against | set | more grasps held (95 %) | more of all objects |",
+        "| --- | --- | --- | --- |",
+    ]
     for method in methods:
         for name in sets if method != "default" else []:
-            both = [
-                [r for r in _chosen(rows, method=m, set=name) if r["result"] != "none"]
-                for m in ("default", method)
-            ]
-            if not all(both):
-                continue
-            scenes = sorted({row["scene"] for mine in both for row in mine})
-            sums = np.zeros((len(scenes), 4))
-            for i, mine in enumerate(both):
-                for row in mine:
-                    sums[scenes.index(row["scene"]), 2 * i : 2 * i + 2] += [
-                        row["result"] == HELD,
-                        1,
-                    ]
-            value, low, high = cluster_bootstrap(sums, _gap, rng)
-            lines.append(f"| {method} | {name} | {value:+.0%}{_between(low, high, '+')} |")
+            both = [_chosen(rows, method=m, set=name) for m in ("default", method)]
+            # Scenes that both have tried: a method may be stopped before another.
+            shared = set.intersection(*({row["scene"] for row in mine} for mine in both))
+            both = [[row for row in mine if row["scene"] in shared] for mine in both]
+            if all(both):
+                more = _more([_tried(mine) for mine in both], rng)
+                objects = _more([_first(mine) for mine in both], rng)
+                lines.append(f"| {method} | {name} | {more} | {objects} |")
     return "\n".join(lines)
+
+
+def _more(both: list[list[Row]], rng: np.random.Generator) -> str:
+    scenes = sorted({row["scene"] for mine in both for row in mine})
+    if not all(both):
+        return "-"
+    sums = np.zeros((len(scenes), 4))
+    for i, mine in enumerate(both):
+        for row in mine:
+            sums[scenes.index(row["scene"]), 2 * i : 2 * i + 2] += [row["result"] == HELD, 1]
+    value, low, high = cluster_bootstrap(sums, _gap, rng)
+    return f"{value:+.0%}{_between(low, high, '+')}"
 
 
 def _gap(totals: np.ndarray) -> np.ndarray:
@@ -130,7 +145,7 @@ def _gap(totals: np.ndarray) -> np.ndarray:
 
 def _reliability(rows: Sequence[Row], rng: np.random.Generator) -> str:
     """How often grasps of `default` held, by score, all that were carried out."""
-    tried = [row for row in rows if row["result"] != "none"]
+    tried = _tried(rows)
     score = np.array([row["score"] for row in tried])
     held = np.array([row["result"] == HELD for row in tried], dtype=float)
     scenes = np.array([row["scene"] for row in tried])
@@ -155,8 +170,8 @@ def _difference(rows: Sequence[Row], rng: np.random.Generator) -> str:
     object's grasps, object by object; one that a method plans no grasp of counts as neither."""
     names = ("default", "mean mesh")
     found: dict[tuple[str, int], dict[str, list[float]]] = {}
-    for row in _chosen(rows):
-        if row["method"] in names and row["result"] != "none":
+    for row in _tried(_chosen(rows)):
+        if row["method"] in names:
             of = found.setdefault((row["scene"], row["object"]), {})
             of.setdefault(row["method"], []).append(float(row["result"] == HELD))
     both = {key: of for key, of in found.items() if len(of) == 2}
