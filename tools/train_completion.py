@@ -32,6 +32,7 @@ from tqdm import tqdm
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from training.interrupted import signalled
+from training.scene_sets import check_names
 
 from brrp_cli.completion.learned import NAME, save_shapes
 from brrp_cli.completion.network import fitted
@@ -96,6 +97,7 @@ def main(
             raise BrrpError("--cooling is a part of --epochs", found=f"{cooling} of {epochs}")
         folder = output / "examples"
         wanted = []
+        check_names(Path(each.partition(":")[0]) for each in sets)
         for each in sets:
             scenes, _, rest = each.partition(":")
             root, _, how = rest.partition(":")

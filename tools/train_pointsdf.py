@@ -10,6 +10,8 @@ and, with other shapes alone (the shapes of `scenes/other` are the first hundred
     python tools/make_scenes.py --meshes other_shapes --seed 5001 --scenes 2000 -o scenes_o
     python tools/train_pointsdf.py scenes_o --data-root . -o train/other
 
+SCENES may be several folders.
+
 First every object of every view becomes an example, a cloud and labelled query points, in
 OUTPUT/examples/*.h5; scenes may be deleted after that. Then the network is trained. The same
 command goes on where it was stopped or killed, with the same losses as if it had not been; more
@@ -35,6 +37,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from training.examples import TRUTHS, Recipe, make_examples, read_examples
 from training.interrupted import signalled
+from training.scene_sets import check_names
 
 from brrp_cli.errors import BrrpError
 from brrp_cli.evaluation.request import find_data_root
@@ -43,7 +46,7 @@ from brrp_cli.ground_truth.true_meshes import truth_cache
 
 
 @click.command()
-@click.argument("scenes", type=click.Path(path_type=Path), required=False)
+@click.argument("scenes", type=click.Path(path_type=Path), nargs=-1)
 @click.option("-o", "--output", required=True, type=click.Path(path_type=Path))
 @click.option(
     "--data-root",
@@ -77,7 +80,7 @@ from brrp_cli.ground_truth.true_meshes import truth_cache
 @click.option("--every", default=200, show_default=True, type=click.IntRange(1), help="Steps.")
 @click.option("--examples-only", is_flag=True, help="Make the examples and stop.")
 def main(
-    scenes: Path | None,
+    scenes: tuple[Path, ...],
     output: Path,
     data_root: Path | None,
     truth: str,
@@ -96,7 +99,7 @@ def main(
     every: int,
     examples_only: bool,
 ) -> None:
-    """Train on SCENES, or on the examples that are in OUTPUT already."""
+    """Train on SCENES, one folder or several, or on the examples that are in OUTPUT already."""
     from training.pointsdf import Training, TrainingConfig, narrowed, split
 
     from brrp_cli.device import pick_device
@@ -109,11 +112,12 @@ def main(
         network = narrowed(NetworkConfig(), width)
         recipe = Recipe(truth, network.points, scale=network.scale)
         folder = output / "examples"
-        if scenes is not None:
-            found = find_scenes(scenes)
-            root = data_root or find_data_root(found, scenes)
+        check_names(scenes)
+        for source in scenes:
+            found = find_scenes(source)
+            root = data_root or find_data_root(found, source)
             made = make_examples(found, root.absolute(), recipe, folder, truth_cache())
-            for _ in tqdm(made, desc="examples", total=len(found)):
+            for _ in tqdm(made, desc=source.name, total=len(found)):
                 pass
         paths = sorted(folder.glob("*.h5"))
         if len(paths) < 2:

@@ -56,3 +56,5 @@ def test_tells_what_is_missing(tmp_path):
     assert result.exit_code == 1 and "Two scenes at least" in result.output
     result = run(tmp_path, "-o", tmp_path / "out")
     assert result.exit_code == 1 and "No scene found" in result.output
+    result = run(tmp_path / "a" / "scenes", tmp_path / "b" / "scenes", "-o", tmp_path / "out")
+    assert result.exit_code == 1 and "Two folders of scenes have one name" in result.output

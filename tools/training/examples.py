@@ -1,6 +1,6 @@
 """Labelled examples to train on, made from scenes once and kept as HDF5.
 
-One file for each scene, NAME.h5, written whole or not at all, so that what was interrupted goes on:
+One file for each scene, SET_NAME.h5, written whole or not at all, so that what was interrupted goes on:
 
     /           schema, recipe (JSON: what decides the numbers)
     clouds      (N, P, 3) float16, farthest-point order, centred and in units of `scale`
@@ -78,7 +78,7 @@ def make_examples(
     or MeshError for a scene that cannot be used.
     """
     for scene in scenes:
-        path = folder / f"{scene.name}.h5"
+        path = folder / f"{scene.folder.parent.name}_{scene.name}.h5"
         if path.exists():
             _read_recipe(path, recipe)
         else:
@@ -119,7 +119,8 @@ def scene_examples(scene: Scene, data_root: Path, recipe: Recipe, cache: Path) -
     )
 
 
-@lru_cache(maxsize=1024)
+# Open3D ends the process where more than a thousand scenes are kept.
+@lru_cache(maxsize=256)
 def _solid(mesh_path: str, data_root: Path, truth: str, cache: Path) -> Solid:
     """The closed mesh that labels, in its file's coordinates."""
     meshes = close_truth(TrueObject(0, mesh_path, np.eye(4)), data_root, cache)
