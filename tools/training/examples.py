@@ -1,6 +1,7 @@
 """Labelled examples to train on, made from scenes once and kept as HDF5.
 
-One file for each scene, SET_NAME.h5, written whole or not at all, so that what was interrupted goes on:
+One file for each scene, SET_NAME.h5, written whole or not at all, so that what was interrupted goes
+on:
 
     /           schema, recipe (JSON: what decides the numbers)
     clouds      (N, P, 3) float16, farthest-point order, centred and in units of `scale`
