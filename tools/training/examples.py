@@ -28,7 +28,7 @@ from numpy.typing import NDArray
 from brrp_cli.errors import BrrpError
 from brrp_cli.files import atomic_path
 from brrp_cli.ground_truth.scenes import Scene
-from brrp_cli.ground_truth.true_meshes import close_truth
+from brrp_cli.ground_truth.true_meshes import close_truth, exact_truth
 from brrp_cli.ground_truth.truth import TrueObject
 from brrp_cli.methods.pointsdf.farthest_points import farthest_points
 from brrp_cli.observation.ray_samples import box_center
@@ -124,8 +124,10 @@ def scene_examples(scene: Scene, data_root: Path, recipe: Recipe, cache: Path) -
 @lru_cache(maxsize=256)
 def _solid(mesh_path: str, data_root: Path, truth: str, cache: Path) -> Solid:
     """The closed mesh that labels, in its file's coordinates."""
-    meshes = close_truth(TrueObject(0, mesh_path, np.eye(4)), data_root, cache)
-    return Solid(meshes.for_iou if truth == "closed" else meshes.exact)
+    item = TrueObject(0, mesh_path, np.eye(4))
+    if truth == "closed":
+        return Solid(close_truth(item, data_root, cache).for_iou)
+    return Solid(exact_truth(item, data_root, cache).mesh)
 
 
 def read_examples(paths: Sequence[Path], recipe: Recipe) -> Examples:
