@@ -20,16 +20,23 @@ CONCAVITY = 0.01
 ITERATIONS = 60
 
 
-def convex_parts(vertices: Array, faces: NDArray[np.int64], how: str, seed: int) -> list[Array]:
+def convex_parts(
+    vertices: Array,
+    faces: NDArray[np.int64],
+    how: str,
+    seed: int,
+    concavity: float = CONCAVITY,
+) -> list[Array]:
     """Corners (k, 3) of convex parts that together hold every vertex (n, 3) of a closed mesh.
 
-    how : "hull", one part, or "coacd", as many as it takes to keep hollows deeper than `CONCAVITY`
-    (Wei et al., SIGGRAPH 2022). The same seed gives the same parts. Errors: DependencyError
+    how : "hull", one part, or "coacd", as many as it takes to keep hollows deeper than `concavity`,
+    metres (Wei et al., SIGGRAPH 2022). The same seed gives the same parts. Errors: DependencyError
     without the library `coacd`.
     """
     if how == HULL:
         return [hull_corners(vertices)]
-    return cover([hull_corners(part) for part in _decomposed(vertices, faces, seed)], vertices)
+    parts = _decomposed(vertices, faces, seed, concavity)
+    return cover([hull_corners(part) for part in parts], vertices)
 
 
 def check_available(how: str) -> None:
@@ -70,14 +77,16 @@ def outside_hull(part: Array, points: Array) -> Array:
     return np.asarray((points @ planes[:, :3].T + planes[:, 3]).max(axis=1))
 
 
-def _decomposed(vertices: Array, faces: NDArray[np.int64], seed: int) -> list[Array]:
+def _decomposed(
+    vertices: Array, faces: NDArray[np.int64], seed: int, concavity: float
+) -> list[Array]:
     coacd: Any = import_library("coacd")
     coacd.set_log_level("error")
     # CoACD measures in a cube of half-width 1 around the mesh, and takes 0.01 to 1.
     half_width = float(np.ptp(vertices, axis=0).max()) / 2
     parts = coacd.run_coacd(
         coacd.Mesh(vertices, faces),
-        threshold=float(np.clip(CONCAVITY / half_width, 0.01, 1.0)),
+        threshold=float(np.clip(concavity / half_width, 0.01, 1.0)),
         # Marching cubes leave a closed 2-manifold; remeshing it would move its surface.
         preprocess_mode="off",
         mcts_iterations=ITERATIONS,

@@ -9,7 +9,7 @@ from PIL import Image
 from scipy.spatial.transform import Rotation
 
 pytest.importorskip("mujoco")
-from grasp_trial.bodies import TrueBody
+from grasp_trial.bodies import TrueBody, true_body
 from grasp_trial.film import HEIGHT, WIDTH, Film, Take, is_target
 from grasp_trial.report import report
 from grasp_trial.trial import (
@@ -28,6 +28,8 @@ from grasp_trial.trial import (
 )
 
 from brrp_cli.grasping.gripper_file import open_gripper
+from brrp_cli.ground_truth.truth import TrueObject
+from brrp_cli.planning.parts import outside_hull
 from brrp_cli.shapes import solids
 
 FRANKA = open_gripper("franka-hand")
@@ -160,3 +162,15 @@ def test_the_report_counts_what_was_carried_out():
     assert "| vprism | prior | +0% | -50% |" in told
     assert "| 0.9 to 0.97 | 11 | 0.90 | 91%" in told and "calibration error: 0.01" in told
     assert "10 objects of which both plan a grasp: +40%" in told
+
+
+def test_a_finger_finds_the_neck_of_a_bottle(tmp_path):
+    """A groove of 8 mm around a can: no part of the body fills it."""
+    profile = [(0, 0), (0.03, 0), (0.03, 0.05), (0.022, 0.055), (0.03, 0.06), (0.03, 0.1), (0, 0.1)]
+    solids.revolve(profile).export(tmp_path / "can.obj")
+    body = true_body(TrueObject(1, "can.obj", np.eye(4)), tmp_path, tmp_path / "cache")
+    turn = np.linspace(0, 2 * np.pi, 24)
+    for radius, is_inside in ((0.0265, False), (0.021, True)):
+        ring = np.column_stack([radius * np.cos(turn), radius * np.sin(turn), 0 * turn + 0.055])
+        nearest = np.min([outside_hull(part, ring) for part in body.parts], axis=0)
+        assert ((nearest < 1e-6) == is_inside).all()

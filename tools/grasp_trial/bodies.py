@@ -13,9 +13,14 @@ from brrp_cli.files import atomic_path
 from brrp_cli.ground_truth.true_meshes import exact_truth
 from brrp_cli.ground_truth.truth import TrueObject
 from brrp_cli.ground_truth.watertight import content_hash
-from brrp_cli.planning.parts import COACD, convex_parts, hull_corners
+from brrp_cli.planning.parts import COACD, HULL, convex_parts
+from brrp_cli.raycast import raycasting_scene
 
 Array = NDArray[np.float64]
+# Hollows that are filled are shallower, metres: a finger finds the neck of a bottle.
+CONCAVITY = 0.003
+# On a hull, to tell whether a mesh is convex.
+POINTS = 5_000
 
 
 @dataclass(frozen=True)
@@ -41,15 +46,23 @@ def true_body(item: TrueObject, data_root: Path | None, cache: Path) -> TrueBody
 
 
 def _parts(mesh: trimesh.Trimesh, cache: Path) -> list[Array]:
-    kept = cache / f"{content_hash(mesh)}-parts.npz"
+    kept = cache / f"{content_hash(mesh)}-parts-{1e3 * CONCAVITY:g}mm.npz"
     if kept.exists():
         with np.load(kept, allow_pickle=False) as arrays:
             return [arrays[name] for name in arrays.files]
     vertices, faces = np.asarray(mesh.vertices), np.asarray(mesh.faces, dtype=np.int64)
-    hull = trimesh.convex.convex_hull(vertices)
     # CoACD takes half a minute for what is convex already.
-    solid = mesh.volume > 0.97 * hull.volume
-    parts = [hull_corners(vertices)] if solid else convex_parts(vertices, faces, COACD, 0)
+    how = HULL if _off_its_hull(mesh) < CONCAVITY else COACD
+    parts = convex_parts(vertices, faces, how, 0, CONCAVITY)
     with atomic_path(kept) as partial:
         np.savez_compressed(partial, *parts)
     return parts
+
+
+def _off_its_hull(mesh: trimesh.Trimesh) -> float:
+    """How far, metres, the hull of a mesh lies from it, at most."""
+    hull = trimesh.convex.convex_hull(np.asarray(mesh.vertices))
+    points, _ = trimesh.sample.sample_surface(hull, POINTS, seed=0)
+    query = np.array(points, dtype=np.float32)
+    distance = raycasting_scene([mesh]).compute_distance(query)
+    return float(distance.numpy().max())
