@@ -11,7 +11,8 @@ import click
 from brrp_cli.commands.json_option import json_option, report_of
 from brrp_cli.commands.results_folder import require_results
 from brrp_cli.commands.seed_option import SEED, SEED_HELP
-from brrp_cli.planning.options import DENSITY, PlanOptions
+from brrp_cli.physics import DENSITY
+from brrp_cli.planning.options import PlanOptions
 from brrp_cli.planning.parts import COACD, HOW, check_available
 from brrp_cli.progress import note
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from brrp_cli.config.ranges import between, share
+from brrp_cli.physics import DENSITY
 
 
 @dataclass(frozen=True)
@@ -44,7 +45,11 @@ class GraspConfig:
     neighbour_nodes : of the grid on which those of recognised objects are found; one of
     `SurfaceConfig.around_nodes` takes six times as long and lies 0.03 mm further out on average
     loose : observed points of objects without a mesh that the hand keeps out of, at most
-    friction : Coulomb's coefficient between fingers and object
+    friction : Coulomb's coefficient between fingers and object; askew : how probably a contact
+    holds that a finger meets edge on, as far outside of the friction cone as can be
+    density, lightest : kg / m3 of the mesh's volume, and kg: what an object is taken to weigh;
+    torque : newton metres of its weight about the closing axis, over which the probability that
+    friction holds it falls to a third
     lever : distance of the closing axis from the object's centre over which a grasp's quality falls
     to a third; taste : power of the quality beside the score in what grasps are ranked by
     apart, apart_angle : of two grasps with the same object one is left out that is nearer
@@ -82,7 +87,11 @@ class GraspConfig:
     neighbour_nodes: int = 150_000
     loose: int = 2_000
     friction: float = 0.5
+    askew: float = share(0.5)
+    density: float = DENSITY
+    lightest: float = 0.1
+    torque: float = 0.6
     lever: float = 0.05
-    taste: float = 0.2
+    taste: float = 0.1
     apart: float = 0.01
     apart_angle: float = between(20.0, 0.0, 180.0)

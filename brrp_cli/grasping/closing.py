@@ -141,11 +141,12 @@ def _pressed(
         ]
     )
     margin = np.where(misses, -1.0, angles.min(axis=0))
-    outside = 1 - np.clip(margin / np.cos(np.arctan(config.friction)), 0, 1)
+    outside = np.clip(1 - margin / np.cos(np.arctan(config.friction)), 0, 1)
+    slips = np.where(margin > 0, (1 - config.askew) * outside, 1.0)
     return Closed(
         collides,
         misses & ~collides,
-        np.where(misses | collides, 0.0, outside),
+        np.where(misses | collides, 0.0, slips),
         np.where(misses[..., None, None], np.nan, contacts),
         touches.mean(axis=(-1, -2)),
         margin,

@@ -23,6 +23,7 @@ from brrp_cli.grasping.gripper import Gripper
 from brrp_cli.grasping.gripper_file import DEFAULT, open_gripper
 from brrp_cli.grasping.obstacles import Obstacles
 from brrp_cli.grasping.options import ALL, APPROACHES, CONE, MIN_SCORE, PER_OBJECT, TOP_DOWN
+from brrp_cli.grasping.quality import carries, quality
 from brrp_cli.grasping.scene import GraspObject, GraspScene, scene_of
 from brrp_cli.observation.support_plane import Plane
 from brrp_cli.reconstruction import Reconstruction
@@ -172,44 +173,15 @@ def _most_promising(
         return poses
     closed = close_on(mesh_alone(own), poses.T, poses.openings, gripper, config)
     holds = closed.holds[0]
-    quality = _quality(poses, closed, item, config)
+    good = quality(poses, closed, item, config)
     # Deepest of those that may hold, in each family; if none does, the deepest.
     rank = np.lexsort([poses.order, holds == 0, poses.family])
     first = np.unique(poses.family[rank], return_index=True)[1]
     best = rank[first]
-    order = np.lexsort([-quality[best], -holds[best]])
+    order = np.lexsort([-good[best], -holds[best]])
     chosen = best[order][: config.candidates]
     fell["not_tried"] = len(poses) - len(chosen)
     return poses.take(chosen)
-
-
-def _quality(poses: Poses, closed: Closed, item: GraspObject, config: GraspConfig) -> Array:
-    """(n,) in [0, 1], what friction, contact and lever leave: how far inside the friction cone, how
-    much of the fingers touches, how close the closing axis passes the object's middle; means over
-    the draws by how probably it holds in each, 0 where it holds in none."""
-    holds = closed.holds
-    count = np.maximum(holds.sum(axis=0), 1e-9)
-    least = np.cos(np.arctan(config.friction))
-    inside = np.clip((closed.margin - least) / (1 - least), 0, 1)
-    # A quarter of the faces is a good contact already.
-    touching = np.minimum(closed.touching * 4, 1)
-    value = (holds * (0.5 + 0.5 * inside) * (0.5 + 0.5 * touching)).sum(axis=0) / count
-    middle = _centre(item)
-    x, centre = poses.T[:, :3, 0], poses.contacts.mean(axis=1)
-    aside = middle - centre
-    aside = aside - np.einsum("ni,ni->n", aside, x)[:, None] * x
-    return np.asarray(value * np.exp(-np.linalg.norm(aside, axis=1) / config.lever))
-
-
-def _centre(item: GraspObject) -> Array:
-    """(3,) centroid of the volume of a closed mesh."""
-    origin = item.vertices.mean(axis=0)
-    a, b, c = (item.vertices[item.faces] - origin).transpose(1, 0, 2)
-    volumes = np.einsum("ni,ni->n", a, np.cross(b, c))
-    total = float(volumes.sum())
-    if total <= 0:
-        return np.asarray(origin)
-    return np.asarray(origin + (volumes @ (a + b + c)) / (4 * total))
 
 
 def _misplacements(config: GraspConfig, rng: np.random.Generator) -> Array:
@@ -245,8 +217,8 @@ def _ranked(
     """The best grasps that are far enough from each other and that no neighbour is in the way of,
     exactly."""
     config, item = task.config, task.item
-    score = (closed.holds * ~low).mean(axis=0)
-    quality = _quality(poses, closed, item, config)
+    score = (closed.holds * ~low).mean(axis=0) * carries(poses, closed, item, config)
+    good = quality(poses, closed, item, config)
     enough = score >= max(task.min_score, 1e-9)
     causes = {
         "object": closed.collides,
@@ -260,7 +232,7 @@ def _ranked(
         fell[why] = fell.get(why, 0) + int((~enough & (worst == i)).sum())
     fell |= {"similar": 0, "more": 0}
     grasps: list[Grasp] = []
-    for i in np.argsort(-worth(score, quality, config), kind="stable"):
+    for i in np.argsort(-worth(score, good, config), kind="stable"):
         if not enough[i]:
             continue
         if len(grasps) == task.per_object:
@@ -270,22 +242,22 @@ def _ranked(
         elif obstacles.hits(poses.T[i], float(poses.openings[i]), task.gripper, config):
             fell["neighbour"] += 1
         else:
-            grasps.append(_grasp(item, poses, closed, int(i), float(score[i]), float(quality[i])))
+            grasps.append(_grasp(item, poses, closed, int(i), float(score[i]), float(good[i])))
     return ObjectGrasps(item.object_id, grasps, fell, "" if grasps else _why(fell))
 
 
 def _grasp(
-    item: GraspObject, poses: Poses, closed: Closed, i: int, score: float, quality: float
+    item: GraspObject, poses: Poses, closed: Closed, i: int, score: float, good: float
 ) -> Grasp:
-    good = closed.holds[:, i] > 0
-    local = np.median(closed.contacts[good, i], axis=0)
+    held = closed.holds[:, i] > 0
+    local = np.median(closed.contacts[held, i], axis=0)
     return Grasp(
         item.object_id,
         poses.T[i],
         float(poses.openings[i]),
         float(local[1, 0] - local[0, 0]),
         score,
-        quality,
+        good,
         np.asarray(transform_points(poses.T[i], local), dtype=np.float64),
     )
 

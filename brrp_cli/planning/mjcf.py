@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brrp_cli.config.planning import RestConfig
+from brrp_cli.physics import GRAVITY
 from brrp_cli.planning.body import Body, lift_onto
 from brrp_cli.planning.numbers import quaternion_wxyz, spell
 
-GRAVITY = 9.81  # m / s^2
 # Meshes are drawn from group 2 and collide in group 3, as MuJoCo's viewer expects it.
 VISUAL, COLLISION = "2", "3"
 CLEARANCE = 0.0005  # metres between the table and what is put on it

@@ -4,10 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from brrp_cli.physics import DENSITY
 from brrp_cli.planning.parts import COACD
-
-# kg / m^3. A guess between an empty box (200) and a full bottle (1,000).
-DENSITY = 500.0
 
 
 @dataclass(frozen=True)

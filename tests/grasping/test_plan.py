@@ -19,6 +19,7 @@ from brrp_cli.grasping.obstacles import Obstacles
 from brrp_cli.grasping.plan import plan_grasps
 from brrp_cli.grasping.scene import GraspObject, GraspScene
 from brrp_cli.observation.support_plane import Plane
+from brrp_cli.physics import GRAVITY
 from brrp_cli.raycast import raycasting_scene
 from brrp_cli.shapes import solids
 
@@ -37,7 +38,8 @@ def scene(*objects: GraspObject, plane: Plane | None = TABLE, loose=NOTHING) -> 
 
 
 def grasps(*objects: GraspObject, plane: Plane | None = TABLE, loose=NOTHING, **options):
-    """Of the first object."""
+    """Of the first object, which weighs nothing unless `config` says so."""
+    options.setdefault("config", GraspConfig(density=0.0, lightest=0.0))
     plan = plan_grasps(scene(*objects, plane=plane, loose=loose), FRANKA, workers=1, **options)
     return next(each for each in plan.objects if each.object_id == objects[0].object_id)
 
@@ -85,9 +87,9 @@ def test_hands_stay_above_the_table():
 def test_a_robot_that_misses_its_pose_may_touch_the_table_beside_what_lies_low():
     """By a millimetre, where the fingers end as much over it."""
     low, tall = (thing(solids.box(0.04, 0.1, height)) for height in (0.012, 0.1))
-    sure = GraspConfig(table_gap=0.001, accuracy=0.0, accuracy_angle=0.0)
+    sure = GraspConfig(table_gap=0.001, accuracy=0.0, accuracy_angle=0.0, density=0.0, lightest=0.0)
     assert grasps(low, config=sure).grasps[0].score == 1.0
-    near = GraspConfig(table_gap=0.001)
+    near = GraspConfig(table_gap=0.001, density=0.0, lightest=0.0)
     assert 0.5 < grasps(low, config=near).grasps[0].score < 1.0
     assert grasps(tall, config=near).grasps[0].score == 1.0
 
@@ -148,7 +150,8 @@ def test_a_wedge_holds_surely_within_the_friction_cone_and_less_outside(lean, fr
     found = closed_on_a_wedge(lean, friction)
     assert found.margin[0, 0] == pytest.approx(np.cos(np.deg2rad(lean)), abs=1e-3)
     edge = np.cos(np.arctan(friction))
-    expected = min(1.0, np.cos(np.deg2rad(lean)) / edge)
+    outside = max(0.0, 1 - np.cos(np.deg2rad(lean)) / edge)
+    expected = 1 - (1 - GraspConfig.askew) * outside
     assert found.holds[0, 0] == pytest.approx(expected, abs=2e-3)
     assert found.slips[0, 0] == pytest.approx(1 - expected, abs=2e-3)
 
@@ -180,7 +183,7 @@ def uncertain(width: float) -> GraspObject:
 
 
 def test_the_score_falls_as_the_posterior_spreads():
-    options = {"min_score": 0.0, "config": replace(GraspConfig(), confidence=0.0)}
+    options = {"min_score": 0.0, "config": GraspConfig(confidence=0.0, density=0.0, lightest=0.0)}
     means = []
     for width in (0.0005, 0.003, 0.01):
         found = grasps(uncertain(width), **options)
@@ -248,3 +251,25 @@ def test_kept_grasps_differ():
 def test_an_approach_that_is_none_is_told():
     with pytest.raises(BrrpError, match="No such approach"):
         grasps(thing(solids.box(0.05, 0.05, 0.05)), approach="sideways")
+
+
+def test_a_heavy_thing_is_held_near_its_middle():
+    """Grasps of a long bar, sure but for its weight."""
+    bar = solids.box(0.3, 0.04, 0.04)
+    exact = {"accuracy": 0.0, "accuracy_angle": 0.0}
+    config = GraspConfig(density=2_000.0, **exact)
+    found = grasps(thing(bar), config=config, min_score=0.0, per_object=200)
+    mass = 2_000.0 * bar.volume
+    levers, shares = [], []
+    for grasp in found.grasps:
+        x, middle = grasp.T_cam_gripper[:3, 0], grasp.contacts.mean(axis=0)
+        levers.append(np.linalg.norm(np.cross(bar.center_mass - middle, x)))
+        likely = np.exp(-mass * GRAVITY * levers[-1] / config.torque)
+        shares.append(grasp.score / likely)
+    # Hands that take an edge may slip besides.
+    assert max(shares) < 1 + 1e-6 and np.median(shares) == pytest.approx(1)
+    assert max(levers) > 0.1 and min(levers) < 0.02
+    # The first ones are those.
+    assert np.mean(levers[:5]) < 0.04
+    light = grasps(thing(bar), config=replace(config, density=0.0, lightest=0.0), per_object=200)
+    assert np.median([grasp.score for grasp in light.grasps]) == 1

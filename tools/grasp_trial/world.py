@@ -8,18 +8,18 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from brrp_cli.config.grasping import GraspConfig
 from brrp_cli.geometry import similarity
 from brrp_cli.grasping.gripper import Gripper
+from brrp_cli.physics import DENSITY
 from brrp_cli.planning.body import mass_and_inertia
 from brrp_cli.planning.numbers import quaternion_wxyz, spell
-from brrp_cli.planning.options import DENSITY
 from grasp_trial.bodies import TrueBody
 
 STEP = 0.001  # seconds
 TABLE_NAME = "table"
 # Contacts yield by force / mass x this time squared: what weighs little is crushed otherwise.
 CONTACT_TIME = 0.002  # seconds
-LIGHTEST = 0.1  # kg
 FORCE = 40.0  # newtons, at most: nobody closes on a ball with all that a hand has
 HAND_MASS, FINGER_MASS = 1.0, 0.05  # kg
 FINGER_DAMPING = 20.0  # N s / m
@@ -72,7 +72,7 @@ def _add_object(assets: ET.Element, world: ET.Element, body: TrueBody, number: i
     element = ET.SubElement(world, "body", {"name": name, **place})
     ET.SubElement(element, "freejoint", name=name)
     mass, inertia = mass_and_inertia(body.mesh, DENSITY)
-    heavier = max(1.0, LIGHTEST / mass)
+    heavier = max(1.0, GraspConfig.lightest / mass)
     mass, inertia = mass * heavier, inertia * heavier
     (xx, xy, xz), (_, yy, yz), (_, _, zz) = inertia
     ET.SubElement(

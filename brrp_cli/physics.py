@@ -1,0 +1,8 @@
+"""What is taken to be so of every object that is lifted or dropped."""
+
+from __future__ import annotations
+
+GRAVITY = 9.81  # m / s^2
+DENSITY = (
+    500.0  # kg / m^3 of an object's volume: between an empty box, 200, and a full bottle, 1,000
+)
