@@ -3,6 +3,5 @@
 from __future__ import annotations
 
 GRAVITY = 9.81  # m / s^2
-DENSITY = (
-    500.0  # kg / m^3 of an object's volume: between an empty box, 200, and a full bottle, 1,000
-)
+# kg / m^3 of an object's volume. A guess between an empty box (200) and a full bottle (1,000).
+DENSITY = 500.0

@@ -21,50 +21,21 @@ from PIL import Image, ImageDraw
 # The script also runs from a checkout that is not installed.
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
+from both_sides import both_sides
+
 from brrp_cli.api import open_result
-from brrp_cli.reconstruction import Surface
-from brrp_cli.rendering.render import View, fitted, render, view_from_behind
 from brrp_cli.results.read import StoredResult
 
 SIZE = 300  # pixels of a picture
-SAMPLES = 2  # rays of a pixel along each axis
 LABEL = 18  # pixels
 
 
 def column(result: StoredResult, object_id: int, name: str) -> NDArray[np.uint8]:
     """(LABEL + 2 SIZE, SIZE, 3) uint8: an object from the camera's side and from behind."""
-    surface = result.surfaces[object_id]
-    T_cam_frame = np.linalg.inv(result.T_frame_cam).astype(np.float64)
-    centre = (surface.vertices.min(axis=0) + surface.vertices.max(axis=0)) / 2
-    # The normal of the table; without one, the image's upwards.
-    up = -result.T_frame_cam[:3, 1] if result.plane is None else result.plane.normal
-    size = SIZE * SAMPLES
-    K = np.array([[size, 0, size / 2], [0, size, size / 2], [0, 0, 1.0]])
-    front = towards(View(K, T_cam_frame, (size, size)), centre)
-    views = (front, view_from_behind(front, centre, up))
-    pictures = [drawn(surface, fitted(view, [surface])) for view in views]
+    pictures = both_sides(result, [result.surfaces[object_id]], SIZE)
     label = Image.new("RGB", (SIZE, LABEL), "white")
     ImageDraw.Draw(label).text((6, 3), name, fill="black")
     return np.vstack([np.asarray(label), *pictures])
-
-
-def towards(view: View, target: NDArray[np.floating]) -> View:
-    """The view turned so that `target` (3,) lies in its middle: an object at the image's border
-    would be drawn askew."""
-    seen = view.T_view_cam[:3, :3] @ target + view.T_view_cam[:3, 3]
-    z = seen / np.linalg.norm(seen)
-    x = np.cross([0.0, 1.0, 0.0], z)
-    x /= np.linalg.norm(x)
-    T = np.eye(4)
-    T[:3, :3] = np.stack([x, np.cross(z, x), z])
-    return View(view.K, T @ view.T_view_cam, view.shape)
-
-
-def drawn(surface: Surface, view: View) -> NDArray[np.uint8]:
-    """(SIZE, SIZE, 3) uint8, smoothed at the edges."""
-    assert surface.colours is not None
-    fine = Image.fromarray(render([surface], [surface.colours], view))
-    return np.asarray(fine.resize((SIZE, SIZE), Image.Resampling.BOX))
 
 
 def wanted(result: StoredResult, names: list[str]) -> list[tuple[int, str]]:

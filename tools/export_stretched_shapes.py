@@ -18,9 +18,9 @@ from tqdm import tqdm
 # The script also runs from a checkout that is not installed.
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from make_scenes import prefixes
 from tabletop.held_out import LEAVE, MIXED, TAKE, chosen
 from tabletop.models import find_meshes
+from tabletop.names_option import prefixes
 from training.completion_examples import STRETCHED
 
 from brrp_cli.errors import BrrpError, MeshError

@@ -44,17 +44,13 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from tabletop.check import MIN_PIXELS, Distance
 from tabletop.held_out import LEAVE, MIXED, TAKE, chosen
 from tabletop.models import find_meshes
+from tabletop.names_option import prefixes
 from tabletop.scene import LIGHTS, LIMITS, SENSOR_NAMES, Plan, check_depth, make_scene
 
 from brrp_cli.dependencies import import_library
 from brrp_cli.errors import BrrpError, SceneError
 
 CHECK_EVERY = 5
-
-
-def prefixes(_context: click.Context, _option: click.Parameter, value: str) -> tuple[str, ...]:
-    """The names, or beginnings of names, of an option that lists them."""
-    return tuple(part.strip() for part in value.split(",") if part.strip())
 
 
 def _size(_context: click.Context, _option: click.Parameter, value: str) -> tuple[int, int]:

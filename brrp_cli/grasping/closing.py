@@ -10,7 +10,7 @@ it lies flat between the fingers, or slips out.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -66,7 +66,7 @@ def close_on(
     hit, normals = _cast(surfaces, T, press - config.grazes * side, side)
     hit = hit - config.grazes
     collides = runs_into(
-        surfaces, T_cam_gripper, openings, gripper, replace(config, inset=config.grazes), off
+        surfaces, T_cam_gripper, openings, gripper, config, off, inset=config.grazes
     )
     return _pressed(hit, normals, press, openings, collides, config)
 
@@ -78,14 +78,17 @@ def runs_into(
     gripper: Gripper,
     config: GraspConfig,
     off: Array | None = None,
+    *,
+    inset: float,
 ) -> Flags:
-    """Which hands touch each of S draws on their way in: (S, n), as `close_on` takes them.
+    """Which hands touch each of S draws on their way in: (S, n), as `close_on` takes them. Their
+    boxes are smaller by `inset` metres on each side.
 
     Rays tell it: what they find is there, and they miss what is thinner than the space between
     them.
     """
     T = _placed(surfaces, T_cam_gripper, off)
-    sweep, length = _sweep_rays(openings, gripper, config)
+    sweep, length = _sweep_rays(openings, gripper, config.approach, inset)
     hit, _ = _cast(surfaces, T, sweep, np.broadcast_to([0.0, 0.0, 1.0], sweep.shape[1:]))
     return np.asarray((hit < length).any(axis=-1))
 
@@ -153,11 +156,12 @@ def _pressed(
     )
 
 
-def _sweep_rays(openings: Array, gripper: Gripper, config: GraspConfig) -> tuple[Array, Array]:
+def _sweep_rays(
+    openings: Array, gripper: Gripper, approach: float, inset: float
+) -> tuple[Array, Array]:
     """Origins (n, k, 3), gripper's frame, of rays along +z through what the hand sweeps, and how
     far (k,) each is swept."""
-    boxes = gripper.boxes(openings, config.approach)
-    inset = config.inset
+    boxes = gripper.boxes(openings, approach)
     origins, lengths = [], []
     for part, (columns, rows) in enumerate(((3, 3), (3, 3), (5, 3))):
         low, high = boxes[:, part, 0], boxes[:, part, 1]

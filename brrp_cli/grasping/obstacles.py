@@ -41,7 +41,7 @@ class Obstacles:
             near = ~found & ((low <= upper) & (high >= lower)).all(axis=1)
             if near.any():
                 alone, T, wide = mesh_alone(mesh), T_cam_gripper[near], openings[near]
-                found[near] = runs_into(alone, T, wide, gripper, config)[0]
+                found[near] = runs_into(alone, T, wide, gripper, config, inset=config.inset)[0]
         if len(self.loose):
             found |= _hold_points(self.loose, T_cam_gripper, openings, gripper, config)
         return found
