@@ -1,8 +1,9 @@
 """Tasks on a Dask cluster: its scheduler, workers anywhere that share a folder with this process.
 
 Dask gives a task whose worker died to another one, a few times (`allowed-failures` of the
-scheduler's configuration, 3 unless set). What it does not know of is here: time limits, faults of
-one machine, workers that lack the folder, and a bound on what is out.
+scheduler's configuration, 3 unless set). What it does not know of is here: which of the tasks that
+a worker held it died of, time limits, faults of one machine, workers that lack the folder, and a
+bound on what is out.
 """
 
 from __future__ import annotations
@@ -37,6 +38,11 @@ RESTART = "60s"
 CONNECT, LOOK, NO_WORKERS, FETCH = 10.0, 2.0, 20.0, 20.0
 # In place of a result whose worker died before it could be had.
 NOT_YET = object()
+
+
+class _WorkersDied(BrrpError):
+    """Of a task, or of another one that was with the same workers."""
+
 
 _LOCAL = re.compile(r"local:([1-9]\d{0,3})")
 _TOKEN = ".brrp-shared-"
@@ -105,12 +111,18 @@ class Cluster:
         self, job: Job, tasks: Sequence[tuple[Any, ...]]
     ) -> Generator[tuple[int, Any], None, None]:
         todo = deque(range(len(tasks)))
+        # The death of a worker counts against all tasks that it holds: those are done again alone.
+        suspects: list[int] = []
+        alone = False
         running: dict[Any, int] = {}
         # Workers whose machine failed a task, by task.
         failed_on: dict[int, list[str]] = {}
         crew = _Crew(self.client, self.title)
         try:
-            while todo or running:
+            while todo or running or suspects:
+                if not todo and not running:
+                    todo.append(suspects.pop(0))
+                    alone = True
                 with self._lost():
                     workers = crew.workers()
                     if self.revive is not None:
@@ -131,6 +143,9 @@ class Cluster:
                         future.release()
                     if isinstance(result, ClusterError):
                         raise result
+                    if isinstance(result, _WorkersDied) and not alone:
+                        suspects.append(index)
+                        continue
                     if isinstance(result, MachineFault):
                         failed_on.setdefault(index, []).append(result.worker)
                         if len(failed_on[index]) <= RETRIES:
@@ -230,7 +245,7 @@ def _result(future: Any, time_limit: float) -> Any:
     except KilledWorker as killed:
         error = killed
     if isinstance(error, KilledWorker):
-        return BrrpError(
+        return _WorkersDied(
             "The worker process died",
             expected=f"a result within {time_limit:g} s",
             found=f"{error.allowed_failures + 1} workers died of it",

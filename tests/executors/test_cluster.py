@@ -100,6 +100,17 @@ def test_each_task_ends_alone_whatever_becomes_of_workers(address: str, tmp_path
     assert rest[2].what == "The worker process died" and "2 workers" in rest[2].found
 
 
+def test_the_death_of_a_worker_is_not_held_against_what_waits_for_it(
+    address: str, tmp_path: Path
+) -> None:
+    """Two workers at most may die of a task here, and more than that die of the first one."""
+    tasks = [("die", tmp_path), *((name, tmp_path) for name in "abcd")]
+    with open_executor(scheduler=address) as executor:
+        results = dict(executor.run(act, tasks, 60.0))
+    assert results[0].what == "The worker process died"
+    assert [results[i] for i in range(1, 5)] == ["A", "B", "C", "D"]
+
+
 def slow(folder: Path) -> int:
     with (folder / "begun").open("a") as stream:
         stream.write(".")
