@@ -43,7 +43,8 @@ class GraspConfig:
     yields : what lies so far behind the first contact of a finger still touches it
     confidence : collision shapes of neighbours hold them with this probability; 0: their meshes
     neighbour_nodes : of the grid on which those of recognised objects are found; one of
-    `SurfaceConfig.around_nodes` takes six times as long and lies 0.03 mm further out on average
+    `SurfaceConfig.around_nodes` takes six times as long and lies 0.03 mm further out on average;
+    neighbour_vertices : in place of `SurfaceConfig.alike_vertices`
     loose : observed points of objects without a mesh that the hand keeps out of, at most
     friction : Coulomb's coefficient between fingers and object; askew : how probably a contact
     holds that a finger meets edge on, as far outside of the friction cone as can be
@@ -85,6 +86,7 @@ class GraspConfig:
     yields: float = 0.005
     confidence: float = share(0.9)
     neighbour_nodes: int = 150_000
+    neighbour_vertices: int = 2_000
     loose: int = 2_000
     friction: float = 0.5
     askew: float = share(0.5)

@@ -21,6 +21,7 @@ class SurfaceConfig:
     spacing is `around_finest` metres at least
     fidelity : metres, standard deviation of a stored mesh from its object; band_draws : of the
     pose, from which the width of the band around it follows, looked at in `band_vertices` vertices
+    `alike_vertices` at most are looked at of a placement that is as probable as the best one.
     Placements that are as probable as the best one are turned by steps of `turn_step` radians:
     between neighbours that are turned by `neighbours` radians at most, and all around an axis that
     `free_turns` of them share to within `one_axis` radians, where any two are such neighbours
@@ -61,5 +62,6 @@ class SurfaceConfig:
     free_turns: int = 3
     neighbours: float = 1.0
     turn_step: float = 0.25
+    alike_vertices: int = 1_000_000
     one_axis: float = 0.25
     most_off: float = share(0.05)

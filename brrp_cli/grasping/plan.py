@@ -82,7 +82,11 @@ def collision_shape(item: GraspObject, scene: GraspScene, config: GraspConfig) -
     own = Mesh(item.vertices, item.faces)
     if item.posterior is None or config.confidence == 0:
         return own
-    surface = replace(scene.surface, around_nodes=config.neighbour_nodes)
+    surface = replace(
+        scene.surface,
+        around_nodes=config.neighbour_nodes,
+        alike_vertices=config.neighbour_vertices,
+    )
     found = confidence_surface(
         item.posterior, item.observed, min(config.confidence, 0.999), surface
     )

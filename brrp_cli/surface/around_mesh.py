@@ -80,12 +80,18 @@ def out_to_reach(shape: PlacedShape, vertices: Array, reach: Array) -> Array:
 
 def reach_of_alike(shape: PlacedShape, config: SurfaceConfig) -> Array:
     """(n,) metres by which the placements that are as probable go beyond each vertex."""
-    reach = np.zeros(len(shape.shape.vertices))
+    own = shape.shape.vertices.astype(np.float64)
+    reach = np.zeros(len(own))
+    step = -(-len(own) // config.alike_vertices)
     T_shape_cam = np.linalg.inv(shape.T_cam_shape)
-    for T in every_alike(shape, config):
-        vertices = transform_points(T_shape_cam @ T, shape.shape.vertices.astype(np.float64))
-        distance, face = shape.shape.nearest(vertices)
-        out = np.maximum(distance, 0.0) * shape.unit
+    for number, T in enumerate(every_alike(shape, config)):
+        # Others each time: turned a little, they come to lie between those of the time before.
+        vertices = transform_points(T_shape_cam @ T, own[number % step :: step])
+        closest, face = shape.shape.closest(vertices)
+        out = np.linalg.norm(closest - vertices, axis=1) * shape.unit
+        # Nearer than that it makes no difference on which side they lie.
+        clear = np.flatnonzero(out > _CLEAR)
+        out[clear[shape.shape.inside(vertices[clear])]] = 0.0
         for corner in shape.shape.faces[face].T:
             np.maximum.at(reach, corner, out)
     # Between two vertices of a placement lies what neither of them reaches.
