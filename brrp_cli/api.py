@@ -33,7 +33,7 @@ def reconstruct(
     *,
     method: str = DEFAULT,
     config: MethodConfig | None = None,
-    retriever: Retriever | None = None,
+    retriever: Retriever | str | None = None,
     weights: str | Path | None = None,
     seed: int = 0,
     device: str = "auto",
@@ -45,8 +45,8 @@ def reconstruct(
 
     method : a name of brrp_cli/methods/registry.py, which also says what it needs of the rest
     config : one of the method's presets, changed or not; without one, its first
-    retriever : P(c|R); without one, CLIP if `BRRP_CLIP_DIR` is set or CLIP was fetched, else
-        appearance
+    retriever : P(c|R), or the name of one as `--retriever` takes it (retrieval/choose.py); without
+        one, CLIP if `BRRP_CLIP_DIR` is set or CLIP was fetched, else appearance
     weights : a file of what the method was trained to
     workers : objects at a time, by default as many as there are cores
     only : ids of the objects that are asked for, by default all; the others are still seen as
@@ -65,7 +65,7 @@ def reconstruct(
         seed=seed,
         device=device,
         prior=prior,
-        retriever=retriever,
+        retriever=None if isinstance(retriever, str) else retriever,
         weights=None if weights is None else Path(weights),
         workers=workers,
         only=None if only is None else frozenset(only),
@@ -73,10 +73,11 @@ def reconstruct(
     )
     chosen.check(setup)
     start = time.perf_counter()
-    if chosen.uses_retriever and retriever is None and prior is not None:
+    if chosen.uses_retriever and setup.retriever is None and prior is not None:
         from brrp_cli.retrieval.choose import choose_retriever
 
-        setup = replace(setup, retriever=choose_retriever("auto", prior, setup.config, seed))
+        name = retriever if isinstance(retriever, str) else "auto"
+        setup = replace(setup, retriever=choose_retriever(name, prior, setup.config, seed))
     seconds = {"retriever": time.perf_counter() - start} if chosen.uses_retriever else {}
     result = chosen.run(frame, setup)
     objects = [each for each in result.objects if only is None or each.object_id in only]

@@ -4,9 +4,8 @@
     python tools/grasp_experiment.py prior=SCENES --prior prior/ --data-root data/ -o grasps.jsonl
     python tools/grasp_experiment.py --report grasps.jsonl
 
-For each object: the three best grasps of each method, which the planner keeps apart, and of
-`default` another one, drawn at random among those that it plans, so that low scores are tried as
-well. A floating hand of boxes with limited force comes in from the pre-grasp, closes, lifts by
+For each object: the three best grasps of each method that `brrp grasp` gives, and of `default`
+another one, drawn at random among all that it can plan, so that low scores are tried as well. A floating hand of boxes with limited force comes in from the pre-grasp, closes, lifts by
 20 cm and shakes, open loop. It misses its pose by as much as the planner's score counts with; the
 same errors for all methods. A grasp holds if the object is still in the hand at the end. A scene
 and method of which there are rows is not run again: what was stopped goes on, and methods may come
@@ -171,13 +170,18 @@ def _scene_rows(
     seen = [i for i in frame.object_ids if int((frame.segmap == i).sum()) >= MIN_PIXELS]
     for method, view in told.items():
         start = time.process_time()
-        plan = plan_grasps(
-            view, hand, config=config, per_object=PER_OBJECT, min_score=0.0, seed=seed, workers=1
-        )
+        plan = plan_grasps(view, hand, config=config, seed=seed, workers=1)
         seconds = time.process_time() - start
         of = {each.object_id: each for each in plan.objects}
+        more = {}
+        if method == DEFAULT:
+            all_of_them = plan_grasps(
+                view, hand, config=config, per_object=PER_OBJECT, min_score=0.0, seed=seed
+            )
+            more = {each.object_id: each.grasps for each in all_of_them.objects}
         for object_id in seen:
             grasps = of[object_id].grasps if object_id in of else []
+            others = more.get(object_id, [])[len(RANKS) :]
             row = {
                 "set": name,
                 "scene": f"{name}/{scene.name}",
@@ -190,11 +194,10 @@ def _scene_rows(
                 none = {"result": "none", "why": why, "score": None}
                 none["drift"] = trials.drift[object_id]
                 yield row | {"rank": RANKS[0]} | none
-                continue
             tried: dict[int | str, Grasp] = dict(zip(RANKS, grasps, strict=False))
-            if method == DEFAULT and len(grasps) > len(RANKS):
+            if others:
                 rng = child_rng(seed, "trial", scene.name, object_id)
-                tried[DRAWN] = grasps[int(rng.integers(len(RANKS), len(grasps)))]
+                tried[DRAWN] = others[int(rng.integers(len(others)))]
             for rank, grasp in tried.items():
                 T = misplaced(
                     frame.T_world_cam @ grasp.T_cam_gripper,

@@ -94,6 +94,8 @@ class AlignmentConfig:
         the best one's; first : weight, in nats, of the score that they reach before any is refined
     most : objects whose placements are refined, the best by likenesses and first score; where none
         of them reaches the score `enough`, so are the next `more`
+    rounds : of so many objects, the most probable first; one that reaches the score `certain` ends
+        them
     least_points : of the object that have to be seen
     neutral : alignment score where nothing can be aligned: about what an object that is rightly
         found has; unaligned : that of objects that were not among those; lowest : a lower score
@@ -105,6 +107,8 @@ class AlignmentConfig:
 
     from_objects: int = 100
     tried: int = 80
+    rounds: int = 2
+    certain: float = share(0.92)
     margin: float = 12.0
     first: float = 15.0
     most: int = 24
@@ -119,6 +123,7 @@ class AlignmentConfig:
         default_factory=lambda: SearchConfig(
             turns=16,
             rotations=200,
+            box_points=200,
             model_points=100,
             seen_points=100,
             first_share=2,

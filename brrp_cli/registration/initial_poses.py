@@ -19,8 +19,8 @@ Array = NDArray[np.float64]
 
 def resting_initial_poses(
     model: ModelGeometry, points: Array, plane: Plane, config: SearchConfig
-) -> list[Array]:
-    """T_cam_model (4, 4) of the model in each resting pose, turned about the plane's normal.
+) -> Array:
+    """T_cam_model (B, 4, 4) of the model in each resting pose, turned about the plane's normal.
 
     points : (n, 3) observed, metres, camera frame, in random order. Along the plane, the box of
     the model's side that faces the camera is laid over the box of the observed points. Where that
@@ -28,7 +28,7 @@ def resting_initial_poses(
     its ends too.
     """
     if not model.resting:
-        return []
+        return np.zeros((0, 4, 4))
     T_plane_cam = plane_frame(plane)
     seen: Array = np.asarray(
         transform_points(T_plane_cam, points[: config.box_points]), dtype=np.float64
@@ -44,14 +44,13 @@ def resting_initial_poses(
     directions = (turned[:, :2, :2] @ longest[:, None, :, None])[..., 0].reshape(-1, 2)
     low, high = _reach(T, directions, counted, model, config)
     more = high - low - _extents(seen, directions, config)
-    shift = np.where(more > config.hidden, more, 0)[:, None] / 2 * directions
-    starts = []
-    for each, hidden_part in zip(T, shift, strict=True):
-        starts.append(each)
-        for way in (hidden_part, -hidden_part) if hidden_part.any() else ():
-            starts.append(each.copy())
-            starts[-1][:2, 3] += way
-    return list(np.linalg.inv(T_plane_cam) @ np.stack(starts))
+    longer = np.flatnonzero(more > config.hidden)
+    way = more[longer, None] / 2 * directions[longer]
+    # Each is followed by itself over either end.
+    order = np.argsort(np.concatenate([np.arange(len(T)), longer, longer]), kind="stable")
+    T = np.concatenate([T, T[longer], T[longer]])
+    T[-2 * len(longer) or len(T) :, :2, 3] += np.concatenate([way, -way])
+    return np.asarray(np.linalg.inv(T_plane_cam) @ T[order])
 
 
 def _laid_over(

@@ -66,7 +66,7 @@ def search(
         model, observed, features, config.matching, config.matchings, seed
     )
     if verifier.plane is not None:
-        initial += resting_initial_poses(model, verifier.points, verifier.plane, config)
+        initial.extend(resting_initial_poses(model, verifier.points, verifier.plane, config))
     T = np.stack(initial)
     T, _ = _best(
         T, model, verifier, config, config.first_factor * config.coarse, config.first_share

@@ -71,13 +71,15 @@ def first_placements(
     """The `coarse` best of all ways to lay a model over what is seen, on a plane that `verifier`
     must have: resting, raised, leaning."""
     assert verifier.plane is not None
-    resting = np.stack(resting_initial_poses(model, verifier.points, verifier.plane, config))
+    resting = resting_initial_poses(model, verifier.points, verifier.plane, config)
+    principal = principal_poses(model, verifier.points[: config.box_points])
+    turned = np.concatenate([spread_rotations(config.rotations), principal[:, :3, :3]])
     T = np.concatenate(
         [
             resting,
             raised_poses(resting, model, verifier.points, verifier.plane, config),
-            principal_poses(model, verifier.points),
-            turned_poses(model, verifier.points, config),
+            principal,
+            turned_poses(turned, model, verifier.points, config),
         ]
     )
     score = _scores(T, model, verifier, config, config.seen_points // config.first_share)
@@ -121,28 +123,30 @@ def principal_poses(model: ModelGeometry, seen: Array) -> Array:
     """T_cam_model (24, 4, 4) that lay the model's principal axes along those of seen points (n, 3),
     in every order and sense, middle on middle: an object that leans on others."""
     middle, own = seen.mean(axis=0), model.surface.mean(axis=0)
-    axes = np.linalg.svd(seen - middle, full_matrices=False)[2]
-    own_axes = np.linalg.svd(model.surface - own, full_matrices=False)[2]
-    # Right-handed, both: what turns one into the other is no mirror.
-    axes[2] *= np.linalg.det(axes)
-    own_axes[2] *= np.linalg.det(own_axes)
     T = np.tile(np.eye(4), (len(_CUBE), 1, 1))
-    T[:, :3, :3] = axes.T @ _CUBE @ own_axes
+    T[:, :3, :3] = _axes(seen - middle) @ _CUBE @ _axes(model.surface - own).T
     T[:, :3, 3] = middle - T[:, :3, :3] @ own
     return T
 
 
-def turned_poses(model: ModelGeometry, seen: Array, config: SearchConfig) -> Array:
-    """T_cam_model (`rotations`, 4, 4) of the model turned in every way: what leans on others.
+def _axes(points: Array) -> Array:
+    """Principal axes (3, 3), the columns, right-handed, of points (n, 3) about their middle."""
+    axes = np.linalg.eigh(points.T @ points)[1]
+    axes[:, 2] *= np.linalg.det(axes)
+    return axes
 
+
+def turned_poses(
+    rotations: Array, model: ModelGeometry, seen: Array, config: SearchConfig
+) -> Array:
+    """T_cam_model (b, 4, 4) of the model turned in some ways: what leans on others.
+
+    rotations : (b, 3, 3), from the model's axes to the camera's
     seen : (n, 3), metres, camera frame, in random order
 
     The box of the side that faces the camera is laid over the box of the seen points across the
     line of sight, and its nearest point to theirs along it.
     """
-    rotations = spread_rotations(config.rotations)
-    if not len(rotations):
-        return np.zeros((0, 4, 4))
     ahead = normalise(seen.mean(axis=0))
     # Two directions across the line of sight, and it.
     T_sight_cam = np.stack([*np.linalg.svd(ahead[None])[2][1:], ahead])

@@ -121,23 +121,26 @@ class AppearanceRetriever:
         if len(points) < own.least_points:
             return replace(look, alignment=own.neutral)
         enough = likely > likely.max() * np.exp(-own.margin)
-
-        def most_alike(kind: NDArray[np.int64]) -> NDArray[np.int64]:
-            order = kind[np.argsort(-likely[kind], kind="stable")]
-            return order[enough[order]][: own.tried]
-
-        # In the prior's order, in which shards hold them.
-        tried = best_of_each(self._shortlist.plain[look.rows], most_alike)
         shuffled = points[np.random.default_rng(self._seed).permutation(len(points))]
         seen = self._aligner.on(shuffled, frame, plane, wave)
-        first = seen.first_scores(self._named(look.rows[tried]))
-        promise = np.log(likely[tried]) + own.first * first
-        order = tried[np.argsort(-promise, kind="stable")]
         alignment = np.full(len(look.rows), own.unaligned, np.float32)
-        for chosen in (order[: own.most], order[own.most : own.most + own.more]):
-            found = seen.scores(self._named(look.rows[chosen]))
-            alignment[chosen] = np.maximum(found, own.lowest)
-            if found.max(initial=0.0) >= own.enough:
+        for turn in range(own.rounds):
+
+            def next_alike(kind: NDArray[np.int64], turn: int = turn) -> NDArray[np.int64]:
+                order = kind[np.argsort(-likely[kind], kind="stable")]
+                return order[enough[order]][turn * own.tried : (turn + 1) * own.tried]
+
+            # In the prior's order, in which shards hold them.
+            tried = best_of_each(self._shortlist.plain[look.rows], next_alike)
+            first = seen.first_scores(self._named(look.rows[tried]))
+            promise = np.log(likely[tried]) + own.first * first
+            order = tried[np.argsort(-promise, kind="stable")]
+            for chosen in (order[: own.most], order[own.most : own.most + own.more]):
+                found = seen.scores(self._named(look.rows[chosen]))
+                alignment[chosen] = np.maximum(found, own.lowest)
+                if found.max(initial=0.0) >= own.enough:
+                    break
+            if alignment.max(initial=0.0) >= own.certain:
                 break
         return replace(look, alignment=alignment)
 

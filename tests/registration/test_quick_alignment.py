@@ -74,7 +74,7 @@ def test_principal_axes_give_the_pose_of_a_whole_surface(models):
 def test_raised_poses_reach_the_top_of_what_is_seen(models):
     where = T_CAM_WORLD @ similarity(translation=np.array([0.05, -0.04, 0.09]))
     verifier = seen(box(), where)
-    resting = np.stack(resting_initial_poses(models[0], verifier.points, TABLE, CONFIG))
+    resting = resting_initial_poses(models[0], verifier.points, TABLE, CONFIG)
     raised = raised_poses(resting, models[0], verifier.points, TABLE, CONFIG)
     assert len(raised)
     top = np.quantile(TABLE.signed_distance(verifier.points), 1 - CONFIG.stray)
@@ -98,7 +98,7 @@ def test_a_turned_model_lies_over_what_is_seen(models):
     """The side that faces the camera, and no other, has the box of the seen points."""
     where = T_CAM_WORLD @ similarity(translation=np.array([0.05, -0.04, 0.2]))
     verifier = seen(box(), where)
-    poses = turned_poses(models[0], verifier.points, CONFIG)
+    poses = turned_poses(spread_rotations(CONFIG.rotations), models[0], verifier.points, CONFIG)
     assert len(poses) == CONFIG.rotations
     turn = np.einsum("bij,ij->b", poses[:, :3, :3], where[:3, :3])
     nearest = poses[int(turn.argmax())]
