@@ -107,13 +107,13 @@ class AlignmentConfig:
 
     from_objects: int = 100
     tried: int = 80
-    rounds: int = 2
+    rounds: int = 3
     certain: float = share(0.92)
     margin: float = 12.0
     first: float = 15.0
     most: int = 24
-    enough: float = share(0.8)
-    more: int = 24
+    enough: float = share(0.88)
+    more: int = 40
     least_points: int = 20
     neutral: float = 0.85
     unaligned: float = 0.3
@@ -149,12 +149,12 @@ class FusionConfig:
     docs/retrieval.md has the commands.
     """
 
-    colour: float = 33.2
-    pairs: float = 9.7
-    size: float = 0.28
-    alignment: float = between(19.7, 0.0, 1000.0)
-    offset: float = between(8.0, -100.0, 100.0)
-    crowding: float = between(0.1, 0.0, 10.0)
+    colour: float = 42.79
+    pairs: float = 9.6
+    size: float = 0.16
+    alignment: float = between(21.88, 0.0, 1000.0)
+    offset: float = between(10.0, -100.0, 100.0)
+    crowding: float = between(0.4, 0.0, 10.0)
 
 
 @dataclass(frozen=True)

@@ -42,11 +42,11 @@ def aligner(prior):
     return retriever_of(prior, True)
 
 
-def retriever_of(prior, aligned, name="default"):
+def retriever_of(prior, aligned, name="default", **numbers):
     """Of a small prior, whose objects are aligned only where that is asked for."""
     config = preset(name)
     if aligned:
-        alignment = dataclasses.replace(config.retrieval.alignment, from_objects=1)
+        alignment = dataclasses.replace(config.retrieval.alignment, from_objects=1, **numbers)
         own = dataclasses.replace(config.retrieval, alignment=alignment)
         config = dataclasses.replace(config, retrieval=own)
     return AppearanceRetriever(prior, config, 0)
@@ -110,6 +110,21 @@ def test_what_is_seen_lies_on_the_true_object_alone(prior, aligner):
         same = {"red_box", "blue_box"} if name.endswith("_box") else {name}
         assert score[name] > 0.85
         assert max(v for other, v in score.items() if other not in same) < score[name] - 0.15
+
+
+def test_more_objects_are_tried_until_one_lies_well(prior):
+    frame, names = scene()
+
+    def aligned(**numbers):
+        aligner = retriever_of(prior, True, tried=1, margin=100.0, unaligned=0.1, **numbers)
+        found = aligner.evidence(frame)
+        return {i: int((found[i].alignment > 0.1).sum()) for i in (*names, STRANGER)}
+
+    assert set(aligned(rounds=1).values()) == {1}
+    # The stranger lies well on nothing, so that all are tried; the others end with their own.
+    until = aligned(rounds=5, certain=0.85)
+    assert until[STRANGER] > max(until[i] for i in names) == 1
+    assert min(aligned(rounds=5, certain=1.0).values()) > 1
 
 
 def test_colours_that_say_nothing_leave_it_to_alignment(prior, aligner):
