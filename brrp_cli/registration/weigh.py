@@ -90,7 +90,7 @@ def weigh(
     """Weights (C + 1,), sum 1, of C hypotheses and, last, of the one that it is something else.
 
     shares : P(c|R) of each hypothesis's object; log_ratios : how much more probable each makes the
-    frame than the last one does, nats; missing : P(not in the prior | R).
+    frame than the last one does, nats; missing : P(none of these objects | R).
     """
     none = float(np.clip(missing, config.least_unknown, config.most_unknown))
     known = np.asarray(shares, dtype=np.float64)

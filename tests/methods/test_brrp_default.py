@@ -165,6 +165,19 @@ def test_what_is_improbable_beside_an_explanation_is_not_placed(folder, truth):
     assert can.weight + found.unknown_weight == pytest.approx(1)
 
 
+def test_what_is_not_tried_counts_as_not_in_the_prior(folder, truth):
+    """However much of P(c|R) is with objects beyond the first k, the others gain nothing by it."""
+    prior = open_prior(folder)
+    weights = []
+    for rest in (0.05, 0.0):
+        sure = Sure([0.1 if name == "can" else rest for name in prior.names])
+        frame, few = photograph({CAN: truth[CAN]}), replace(CONFIG, k=1)
+        found = reconstruct(frame, prior, retriever=sure, config=few).objects[0]
+        assert found.unknown_probability == pytest.approx(1 - sure.shares.sum())
+        weights.append(found.retrieved[0].weight)
+    assert 0 < weights[0] == pytest.approx(weights[1])
+
+
 def test_a_map_that_is_nowhere_sure_enough_has_no_surface_but_files(folder, truth, tmp_path):
     config = replace(CONFIG, surface=replace(CONFIG.surface, level=0.99999))
     result = reconstruct(photograph({CAN: truth[CAN]}), open_prior(folder), config=config)
