@@ -5,11 +5,12 @@
     python tools/grasp_experiment.py --report grasps.jsonl
 
 For each object: the three best grasps of each method that `brrp grasp` gives, and of `default`
-another one, drawn at random among all that it can plan, so that low scores are tried as well. A floating hand of boxes with limited force comes in from the pre-grasp, closes, lifts by
-20 cm and shakes, open loop. It misses its pose by as much as the planner's score counts with; the
-same errors for all methods. A grasp holds if the object is still in the hand at the end. A scene
-and method of which there are rows is not run again: what was stopped goes on, and methods may come
-later. --film draws the first grasps of this run that held, and the first that failed in each way.
+another one, drawn at random among all that it can plan, so that low scores are tried as well. A
+floating hand of boxes with limited force comes in from the pre-grasp, closes, lifts by 20 cm and
+shakes, open loop. It misses its pose by as much as the planner's score counts with; the same errors
+for all methods. A grasp holds if the object is still in the hand at the end. A scene and method of
+which there are rows is not run again: what was stopped goes on, and methods may come later. --film
+draws the first grasps of this run that held, and the first that failed in each way.
 """
 
 from __future__ import annotations

@@ -40,7 +40,7 @@ CONNECT, LOOK, NO_WORKERS, FETCH = 10.0, 2.0, 20.0, 20.0
 NOT_YET = object()
 
 
-class _WorkersDied(BrrpError):
+class _WorkersDiedError(BrrpError):
     """Of a task, or of another one that was with the same workers."""
 
 
@@ -143,7 +143,7 @@ class Cluster:
                         future.release()
                     if isinstance(result, ClusterError):
                         raise result
-                    if isinstance(result, _WorkersDied) and not alone:
+                    if isinstance(result, _WorkersDiedError) and not alone:
                         suspects.append(index)
                         continue
                     if isinstance(result, MachineFault):
@@ -245,7 +245,7 @@ def _result(future: Any, time_limit: float) -> Any:
     except KilledWorker as killed:
         error = killed
     if isinstance(error, KilledWorker):
-        return _WorkersDied(
+        return _WorkersDiedError(
             "The worker process died",
             expected=f"a result within {time_limit:g} s",
             found=f"{error.allowed_failures + 1} workers died of it",

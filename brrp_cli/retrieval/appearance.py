@@ -28,7 +28,7 @@ from brrp_cli.retrieval.aligned import Aligner
 from brrp_cli.retrieval.illuminants import lights, local_lights, log_prior
 from brrp_cli.retrieval.observed_appearance import see_object
 from brrp_cli.retrieval.score_fusion import Similarity, believe
-from brrp_cli.retrieval.shortlist import Shortlist, best_of_each
+from brrp_cli.retrieval.shortlist import Shortlist, kinds
 from brrp_cli.retrieval.similarity import lit_histograms, similarity
 
 
@@ -120,18 +120,15 @@ class AppearanceRetriever:
         own = self._config.retrieval.alignment
         if len(points) < own.least_points:
             return replace(look, alignment=own.neutral)
-        enough = likely > likely.max() * np.exp(-own.margin)
+        alike = np.argsort(-likely, kind="stable")
+        alike = alike[likely[alike] > likely.max() * np.exp(-own.margin)]
+        ranked = [alike[kind] for kind in kinds(self._shortlist.plain[look.rows[alike]])]
         shuffled = points[np.random.default_rng(self._seed).permutation(len(points))]
         seen = self._aligner.on(shuffled, frame, plane, wave)
         alignment = np.full(len(look.rows), own.unaligned, np.float32)
-        for turn in range(own.rounds):
-
-            def next_alike(kind: NDArray[np.int64], turn: int = turn) -> NDArray[np.int64]:
-                order = kind[np.argsort(-likely[kind], kind="stable")]
-                return order[enough[order]][turn * own.tried : (turn + 1) * own.tried]
-
+        for begin in range(0, own.rounds * own.tried, own.tried):
             # In the prior's order, in which shards hold them.
-            tried = best_of_each(self._shortlist.plain[look.rows], next_alike)
+            tried = np.sort(np.concatenate([kind[begin : begin + own.tried] for kind in ranked]))
             first = seen.first_scores(self._named(look.rows[tried]))
             promise = np.log(likely[tried]) + own.first * first
             order = tried[np.argsort(-promise, kind="stable")]

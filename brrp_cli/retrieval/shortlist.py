@@ -64,8 +64,14 @@ def best_of_each(
 
     plain : (n,) which objects have no colours; best : from some of 0 to n - 1, the best of them
     """
-    kinds = (np.flatnonzero(plain), np.flatnonzero(~plain))
-    return np.sort(np.concatenate([best(kind) for kind in kinds if len(kind)]))
+    return np.sort(np.concatenate([best(kind) for kind in kinds(plain)]))
+
+
+def kinds(plain: NDArray[np.bool_]) -> list[NDArray[np.int64]]:
+    """Which objects have no colours, and which have, of those that are `plain` (n,) and the others;
+    no kind without any."""
+    both = (np.flatnonzero(plain), np.flatnonzero(~plain))
+    return [kind for kind in both if len(kind)]
 
 
 def _best(score: NDArray[np.float32], count: int) -> NDArray[np.int64]:
