@@ -84,7 +84,7 @@ def reconstruct_by_hypotheses(
         ]
         missing = unknown(probabilities)
         # Stored objects that are not tried are as good as not in the prior.
-        not_tried = 1 - sum(probability for _, probability in chosen)
+        none_tried = unknown(np.array([probability for _, probability in chosen]))
     with timed(seconds, "registration"):
         observed = observed_cloud(observation.points, config.features)
         lost = views.lost(hypotheses) if begun else frozenset()
@@ -125,7 +125,7 @@ def reconstruct_by_hypotheses(
                 placed, joint = _in_all_views(
                     placed, alone, observation, verifier, wave, noise, hypotheses, views
                 )
-            return placed, alone, weigh(shares, joint, not_tried, hypotheses.weigh)
+            return placed, alone, weigh(shares, joint, none_tried, hypotheses.weigh)
 
         found = searched(frozenset(begun) | lost | views.hopeless())
         placed, alone, weights = weighed(found)

@@ -54,7 +54,7 @@ class Placed:
 
 @dataclass(frozen=True)
 class Mask:
-    """group : name of its set; scene, number : which; missing : P(not in the prior | R); aligned :
+    """group : name of its set; scene, number : which; missing : P(none of those tried | R); aligned :
     whether P(c|R) knows the depth"""
 
     group: str
@@ -94,7 +94,8 @@ def collect(
         likelihood, sensor = hypotheses.likelihood, hypotheses.sensor
         shown = see(cleaned, number, seen.plane, noise, sensor.patch, sensor.bleed, likelihood)
         found: list[tuple[Hypothesis, float]] = []
-        for stored_name, share in top_k(probabilities, prior.names, config.k):
+        chosen = top_k(probabilities, prior.names, config.k)
+        for stored_name, share in chosen:
             best = max((each.alignment_score for each, _ in found), default=-np.inf)
             found_here = search(
                 search_model(prior.load(stored_name)),
@@ -126,7 +127,7 @@ def collect(
                 name,
                 len(mine),
                 name in prior.names,
-                float(unknown(probabilities)),
+                unknown(np.array([share for _, share in chosen])),
                 knows_depth(retriever),
                 rows,
             )
