@@ -54,8 +54,8 @@ class Placed:
 
 @dataclass(frozen=True)
 class Mask:
-    """group : name of its set; scene, number : which; missing : P(none of those tried | R); aligned :
-    whether P(c|R) knows the depth"""
+    """group : name of its set; scene, number : which; missing : P(none that is tried | R);
+    aligned : whether P(c|R) knows the depth"""
 
     group: str
     scene: str
