@@ -144,8 +144,8 @@ class FusionConfig:
     odds, which falls by `crowding` with the logarithm of the prior's size: see
     brrp_cli/retrieval/score_fusion.py.
 
-    Fitted by tools/fit_appearance.py on made scenes, seeds 51100 to 51400, and a prior of 274
-    objects; `offset` and `crowding` were set between what fits that one and one of 50.
+    Fitted by tools/fit_appearance.py on made scenes, seeds 51150 to 51400, and priors of 274 and
+    1,196 objects; `offset` was then lowered from 10.48, so that fewer strangers are taken.
     docs/retrieval.md has the commands.
     """
 

@@ -37,7 +37,7 @@ PARTS = (
     f"{DISTANCES}/values",
 )
 # Models that are held in memory, 0.2 MB each.
-HELD = 512
+HELD = 1024
 
 
 class Aligner:
