@@ -21,10 +21,10 @@ class SurfaceConfig:
     spacing is `around_finest` metres at least
     fidelity : metres, standard deviation of a stored mesh from its object; band_draws : of the
     pose, from which the width of the band around it follows, looked at in `band_vertices` vertices
-    `alike_vertices` at most are looked at of a placement that is as probable as the best one.
     Placements that are as probable as the best one are turned by steps of `turn_step` radians:
     between neighbours that are turned by `neighbours` radians at most, and all around an axis that
-    `free_turns` of them share to within `one_axis` radians, where any two are such neighbours
+    `free_turns` of them share to within `one_axis` radians, where any two are such neighbours; how
+    far each reaches is looked at in `alike_vertices` vertices at most
     keep_distance : metres; a component of the level set further from every observed point is
     hallucinated
     one_piece : whether an object is one piece; the published methods keep every part near what was

@@ -46,11 +46,11 @@ def resting_initial_poses(
     more = high - low - _extents(seen, directions, config)
     longer = np.flatnonzero(more > config.hidden)
     way = more[longer, None] / 2 * directions[longer]
+    ends = np.concatenate([T[longer], T[longer]])
+    ends[:, :2, 3] += np.concatenate([way, -way])
     # Each is followed by itself over either end.
     order = np.argsort(np.concatenate([np.arange(len(T)), longer, longer]), kind="stable")
-    T = np.concatenate([T, T[longer], T[longer]])
-    T[-2 * len(longer) or len(T) :, :2, 3] += np.concatenate([way, -way])
-    return np.asarray(np.linalg.inv(T_plane_cam) @ T[order])
+    return np.asarray(np.linalg.inv(T_plane_cam) @ np.concatenate([T, ends])[order])
 
 
 def _laid_over(

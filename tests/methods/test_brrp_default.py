@@ -12,6 +12,7 @@ from table_scene import T_CAM_WORLD, T_WORLD_CAM, box, in_camera, photograph, pl
 from brrp_cli import Reconstructor, open_posterior, open_prior, reconstruct, write_results
 from brrp_cli.config import SearchConfig, preset
 from brrp_cli.demo.layout import turn
+from brrp_cli.errors import RetrievalError
 from brrp_cli.geometry import similarity, transform_points
 from brrp_cli.ground_truth.surface_metrics import MeshSurface
 from brrp_cli.prior.build.build import build_prior
@@ -141,6 +142,16 @@ def test_retrieval_that_is_wrong_is_outweighed_by_what_the_frame_says(folder, tr
     assert [r.name for r in found.retrieved] == ["box", "can"]
     assert weights["can"] > 0.9
     assert iou(found.surface, truth[CAN]) > 0.85
+
+
+def test_a_retriever_may_be_named(folder, truth):
+    frame, prior = photograph({CAN: truth[CAN]}), open_prior(folder)
+    found = reconstruct(frame, prior, retriever="uniform")
+    assert found.retriever == "uniform"
+    shares = [each.probability for each in found.objects[0].retrieved]
+    assert shares == pytest.approx([1 / len(prior.names)] * len(shares))
+    with pytest.raises(RetrievalError, match="No such retriever"):
+        reconstruct(frame, prior, retriever="telepathy")
 
 
 class Sure:

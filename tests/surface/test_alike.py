@@ -11,7 +11,7 @@ from test_around_mesh import region, shape_of
 
 from brrp_cli.config import SurfaceConfig
 from brrp_cli.surface.alike import every_alike
-from brrp_cli.surface.around_mesh import out_to_reach
+from brrp_cli.surface.around_mesh import out_to_reach, reach_of_alike
 
 CONFIG = SurfaceConfig(around_nodes=400_000)
 
@@ -61,6 +61,16 @@ def test_neighbours_about_several_axes_have_the_ways_between():
 
 def test_nothing_is_alike_where_nothing_was():
     assert every_alike(shape_of("box"), CONFIG).shape == (0, 4, 4)
+
+
+def test_a_part_of_the_vertices_tells_how_far_turns_reach():
+    """A box that turns freely sweeps a round region, whichever of its vertices are looked at."""
+    shape = with_turns("box", [0, 0, 40], [0, 0, -60], [0, 0, 110])
+    every = reach_of_alike(shape, CONFIG)
+    half = reach_of_alike(shape, replace(CONFIG, alike_vertices=len(every) // 2))
+    assert every.max() > 0.005
+    assert (half <= every + 1e-12).all()
+    assert half.mean() == pytest.approx(every.mean(), rel=0.1)
 
 
 def test_a_surface_of_a_coarse_grid_is_moved_out_to_its_reach():
