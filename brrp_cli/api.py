@@ -60,6 +60,8 @@ def reconstruct(
     it lacks or cannot use; PriorError for a shard that is damaged, when an object is read from it.
     """
     chosen = reconstructing_method(method)
+    if isinstance(retriever, str) and not chosen.uses_retriever:
+        raise chosen.takes_no_retriever()
     setup = Setup(
         config=config if config is not None else chosen.preset(),
         seed=seed,

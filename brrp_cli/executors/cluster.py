@@ -13,7 +13,6 @@ import logging
 import math
 import re
 import time
-import uuid
 from collections import deque
 from collections.abc import Callable, Generator, Iterator, Sequence
 from concurrent.futures import CancelledError
@@ -24,7 +23,7 @@ from typing import Any
 from brrp_cli.errors import BrrpError, ClusterError, DependencyError
 from brrp_cli.executors.cluster_task import Job, MachineFault, work
 from brrp_cli.executors.processes import cannot_start
-from brrp_cli.files import cannot_write
+from brrp_cli.executors.shared_folder import token
 from brrp_cli.progress import note
 
 # Tasks that are out beyond one for each worker thread, so that no worker waits for this process.
@@ -45,7 +44,6 @@ class _WorkersDiedError(BrrpError):
 
 
 _LOCAL = re.compile(r"local:([1-9]\d{0,3})")
-_TOKEN = ".brrp-shared-"
 
 
 @contextmanager
@@ -102,7 +100,7 @@ class Cluster:
         writes: Path | None = None,
     ) -> Generator[tuple[int, Any], None, None]:
         """As `Executor.run`."""
-        with _token(writes) as tokens:
+        with token(writes) as tokens:
             seen = tuple(path.resolve() for path in (*reads, *tokens))
             job = Job(function, time_limit, Path.cwd(), seen)
             yield from self._results(job, tasks)
@@ -112,7 +110,7 @@ class Cluster:
     ) -> Generator[tuple[int, Any], None, None]:
         todo = deque(range(len(tasks)))
         # The death of a worker counts against all tasks that it holds: those are done again alone.
-        suspects: list[int] = []
+        suspects: deque[int] = deque()
         alone = False
         running: dict[Any, int] = {}
         # Workers whose machine failed a task, by task.
@@ -121,7 +119,7 @@ class Cluster:
         try:
             while todo or running or suspects:
                 if not todo and not running:
-                    todo.append(suspects.pop(0))
+                    todo.append(suspects.popleft())
                     alone = True
                 with self._lost():
                     workers = crew.workers()
@@ -311,26 +309,6 @@ def _no_answer(address: str, error: Exception) -> ClusterError:
         expected="tcp://HOST:8786 as dask scheduler prints it, its scheduler file, or local:N",
         fix="start one with dask scheduler, and check that this machine reaches its port",
     )
-
-
-@contextmanager
-def _token(folder: Path | None) -> Iterator[list[Path]]:
-    """A file in `folder` of a name that no other folder has: who sees it sees this very folder."""
-    if folder is None:
-        yield []
-        return
-    for left in folder.glob(f"{_TOKEN}*"):
-        # Of a client that was killed.
-        left.unlink(missing_ok=True)
-    token = folder / f"{_TOKEN}{uuid.uuid4().hex}"
-    try:
-        token.touch()
-    except OSError as error:
-        raise cannot_write(token, error) from error
-    try:
-        yield [token]
-    finally:
-        token.unlink(missing_ok=True)
 
 
 @contextmanager

@@ -133,6 +133,10 @@ class Method:
             )
         return self.presets[name]
 
+    def takes_no_retriever(self) -> BrrpError:
+        """What is told where one was given in vain."""
+        return BrrpError(f"{self.name} uses no retriever", found="a retriever", fix="leave it out")
+
     def check(self, setup: Setup) -> None:
         """What is lacking, or given in vain, is told before any work is done.
 
@@ -153,9 +157,7 @@ class Method:
         if not self.uses_prior and setup.prior is not None:
             raise BrrpError(f"{self.name} uses no prior", found="a prior", fix="leave it out")
         if not self.uses_retriever and setup.retriever is not None:
-            raise BrrpError(
-                f"{self.name} uses no retriever", found="a retriever", fix="leave it out"
-            )
+            raise self.takes_no_retriever()
         if self.uses_weights and setup.weights is None:
             raise WeightsError(
                 f"{self.name} needs trained weights",

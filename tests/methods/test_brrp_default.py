@@ -12,7 +12,7 @@ from table_scene import T_CAM_WORLD, T_WORLD_CAM, box, in_camera, photograph, pl
 from brrp_cli import Reconstructor, open_posterior, open_prior, reconstruct, write_results
 from brrp_cli.config import SearchConfig, preset
 from brrp_cli.demo.layout import turn
-from brrp_cli.errors import RetrievalError
+from brrp_cli.errors import BrrpError, RetrievalError
 from brrp_cli.geometry import similarity, transform_points
 from brrp_cli.ground_truth.surface_metrics import MeshSurface
 from brrp_cli.prior.build.build import build_prior
@@ -152,6 +152,8 @@ def test_a_retriever_may_be_named(folder, truth):
     assert shares == pytest.approx([1 / len(prior.names)] * len(shares))
     with pytest.raises(RetrievalError, match="No such retriever"):
         reconstruct(frame, prior, retriever="telepathy")
+    with pytest.raises(BrrpError, match="uses no retriever"):
+        reconstruct(frame, method="vprism", retriever="uniform")
 
 
 class Sure:
