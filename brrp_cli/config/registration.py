@@ -227,6 +227,8 @@ class LikelihoodConfig:
     most_votes : that all votes can come to; base : nats of any placement
     other_size : nats against a placement at another size than the stored one
     within : placements whose alignment score is less than the best by more have no weight
+    refined_from : nats; where the best placement of a stored object reaches them, it is refined by
+        rays and judged again
     """
 
     rays_across_patch: float = 3.0
@@ -243,18 +245,19 @@ class LikelihoodConfig:
     surface_points: int = 600
     colours: int = 150
     colour_spread: float = 6.0
-    depth: float = 3.0
-    depth_aligned: float = 0.4
-    missed: float = 18.0
-    covered: float = 0.8
-    free_space: float = 10.0
-    unmasked: float = 5.0
-    below: float = 20.0
-    colour: float = 6.0
-    most_votes: float = 2.0
-    base: float = between(0.5, -50.0, 50.0)
+    depth: float = 5.1
+    depth_aligned: float = 0.39
+    missed: float = 34.0
+    covered: float = 0.95
+    free_space: float = 20.7
+    unmasked: float = 6.7
+    below: float = 49.0
+    colour: float = 5.5
+    most_votes: float = 1.03
+    base: float = between(1.0, -50.0, 50.0)
     other_size: float = 3.6
     within: float = 0.5
+    refined_from: float = between(-6.0, -1000.0, 1000.0)
 
 
 @dataclass(frozen=True)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -18,18 +17,19 @@ from brrp_cli.observation.ray_samples import ObjectObservation
 from brrp_cli.observation.support_plane import Plane
 from brrp_cli.prior.store import Prior
 from brrp_cli.reconstruction import OK, ObjectReconstruction, Retrieved, Similar
-from brrp_cli.registration.likelihood import see
+from brrp_cli.registration.likelihood import SeenObject, see
 from brrp_cli.registration.model import search_model
 from brrp_cli.registration.pose_search import Hypothesis, search
-from brrp_cli.registration.ray_refinement import refine_by_rays
+from brrp_cli.registration.refined import refined
 from brrp_cli.registration.scale_scan import observed_cloud
 from brrp_cli.registration.turned import turned
 from brrp_cli.registration.verification import Verifier
 from brrp_cli.registration.weigh import (
     SeenFrom,
     best_ratios,
+    counted_once,
     joint_log_likelihood,
-    log_likelihoods,
+    judged,
     weigh,
 )
 from brrp_cli.retrieval.base import Retriever, knows_depth, top_k, unknown
@@ -61,7 +61,7 @@ def reconstruct_by_hypotheses(
     None = there is no stream
     """
     assert config.hypotheses is not None
-    hypotheses = _counted_once(config.hypotheses, retriever)
+    hypotheses = counted_once(config.hypotheses, knows_depth(retriever))
     seconds: dict[str, float] = {}
     object_id = observation.object_id
     views = ALONE if earlier is None else earlier
@@ -88,6 +88,10 @@ def reconstruct_by_hypotheses(
     with timed(seconds, "registration"):
         observed = observed_cloud(observation.points, config.features)
         lost = views.lost(hypotheses) if begun else frozenset()
+        sensor = hypotheses.sensor
+        seen = see(
+            frame, object_id, plane, noise, sensor.patch, sensor.bleed, hypotheses.likelihood
+        )
 
         def searched(skipped: frozenset[str]) -> list[list[Hypothesis]]:
             found: list[list[Hypothesis]] = []
@@ -119,11 +123,16 @@ def reconstruct_by_hypotheses(
         def weighed(found: list[list[Hypothesis]]) -> tuple[list[Hypothesis], list[float], Array]:
             placed = [each for group in found for each in group]
             shares = [p for (_, p), group in zip(chosen, found, strict=True) for _ in group]
-            alone = log_likelihoods(placed, frame, object_id, plane, noise, hypotheses)
+            placed, alone = judged(
+                placed,
+                seen,
+                hypotheses,
+                lambda each: refined(each, verifier, wave, hypotheses, views.rays()),
+            )
             joint = alone
             if views and max(alone, default=-np.inf) > -views.config.against:
                 placed, joint = _in_all_views(
-                    placed, alone, observation, verifier, wave, noise, hypotheses, views
+                    placed, alone, observation, seen, verifier, wave, hypotheses, views
                 )
             return placed, alone, weigh(shares, joint, none_tried, hypotheses.weigh)
 
@@ -151,11 +160,11 @@ def reconstruct_by_hypotheses(
         kept = _kept(shared, hypotheses.map)
         alike: dict[int, Array] = {}
         for i in kept[kept < len(placed)]:
-            placed[i] = _refined(placed[i], verifier, wave, hypotheses, views)
+            placed[i] = refined(placed[i], verifier, wave, hypotheses, views.rays())
             if not views:
                 best = turned(placed[i], verifier, hypotheses.sensor.patch, hypotheses.search)
                 if best.best is not placed[i]:
-                    placed[i] = _refined(best.best, verifier, wave, hypotheses, views)
+                    placed[i] = refined(best.best, verifier, wave, hypotheses, views.rays())
                 alike[i] = best.alike
         shapes = [
             placed_shape(placed[i], observation.points, wave, hypotheses, views, alike.get(i))
@@ -216,14 +225,6 @@ def reconstruct_by_hypotheses(
     )
 
 
-def _counted_once(config: HypothesesConfig, retriever: Retriever) -> HypothesesConfig:
-    """With less worth of depth residuals where P(c|R) follows from depth already."""
-    likelihood = config.likelihood
-    if not knows_depth(retriever):
-        return config
-    return replace(config, likelihood=replace(likelihood, depth=likelihood.depth_aligned))
-
-
 def _shared_with_kin(weights: Array, like: list[KinHypothesis]) -> Array:
     """Weights of what was placed, of kin, and of the completion: kin take from "none of them"."""
     none = weights[-1]
@@ -235,29 +236,19 @@ def _in_all_views(
     placed: list[Hypothesis],
     alone: list[float],
     observation: ObjectObservation,
+    seen: SeenObject,
     verifier: Verifier,
     wave: float,
-    noise: PixelNoise,
     config: HypothesesConfig,
     views: EarlierViews,
 ) -> tuple[list[Hypothesis], list[float]]:
     """Placements fitted to the rays of all views, and their log likelihood ratios in all of them:
     of those whose ratio in this frame, `alone`, comes near the best."""
-    sensor = config.sensor
-    seen = see(
-        verifier.frame,
-        observation.object_id,
-        verifier.plane,
-        noise,
-        sensor.patch,
-        sensor.bleed,
-        config.likelihood,
-    )
     every = [SeenFrom(seen, np.eye(4)), *views.seen()]
     votes = views.votes(observation.center)
     near = [ratio > max(alone) - views.config.worth for ratio in alone]
     placed = [
-        _refined(each, verifier, wave, config, views) if asked else each
+        refined(each, verifier, wave, config, views.rays()) if asked else each
         for each, asked in zip(placed, near, strict=True)
     ]
     asked_ratios = [
@@ -284,29 +275,6 @@ def _kept(weights: Array, config: FittedMapConfig) -> NDArray[np.int64]:
     than particles, in their order."""
     order = np.argsort(-weights, kind="stable")[: config.particles]
     return np.sort(order[(weights[order] >= config.least_weight) | (np.arange(len(order)) == 0)])
-
-
-def _refined(
-    hypothesis: Hypothesis,
-    verifier: Verifier,
-    wave: float,
-    config: HypothesesConfig,
-    views: EarlierViews,
-) -> Hypothesis:
-    """Placed by the rays of what was seen, in the end; its score stays."""
-    T_cam_object = refine_by_rays(
-        hypothesis.T_cam_object,
-        hypothesis.model.stored.shape,
-        verifier.points,
-        float(verifier.frame.K[0, 0]),
-        verifier.plane,
-        wave,
-        config.sensor,
-        config.refine,
-        views.rays(),
-    )
-    T_cam_model = T_cam_object @ np.linalg.inv(hypothesis.model.T_model_object)
-    return replace(hypothesis, T_cam_model=T_cam_model)
 
 
 def _shuffled(points: NDArray[np.float32], seed: int, object_id: int) -> Array:

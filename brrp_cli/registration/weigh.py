@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from brrp_cli.config import HypothesesConfig, WeighConfig
-from brrp_cli.frames.frame import Frame
-from brrp_cli.observation.pixel_noise import PixelNoise
-from brrp_cli.observation.support_plane import Plane
-from brrp_cli.registration.likelihood import SeenObject, evidence, log_likelihood, see
+from brrp_cli.registration.likelihood import SeenObject, evidence, log_likelihood
 from brrp_cli.registration.pose_search import Hypothesis
 
 Array = NDArray[np.float64]
@@ -27,27 +24,46 @@ class SeenFrom:
     T_view_cam: Array
 
 
-def log_likelihoods(
+def counted_once(config: HypothesesConfig, knows_depth: bool) -> HypothesesConfig:
+    """With less worth of depth residuals where P(c|R) follows from depth already."""
+    likelihood = config.likelihood
+    if not knows_depth:
+        return config
+    return replace(config, likelihood=replace(likelihood, depth=likelihood.depth_aligned))
+
+
+def judged(
     placed: list[Hypothesis],
-    frame: Frame,
-    object_id: int,
-    plane: Plane | None,
-    noise: PixelNoise,
+    seen: SeenObject,
     config: HypothesesConfig,
-) -> list[float]:
-    """Of each placement, against that it is none of the stored objects, nats."""
-    likelihood, sensor = config.likelihood, config.sensor
-    seen = see(frame, object_id, plane, noise, sensor.patch, sensor.bleed, likelihood)
+    refined: Callable[[Hypothesis], Hypothesis],
+) -> tuple[list[Hypothesis], list[float]]:
+    """Placements and the log likelihood ratio of each, nats, against that it is none of the stored
+    objects; where that may decide, the best of each stored object is `refined` first.
+
+    The search is right to a millimetre, and a shape that is nearly the right one is no further off.
+    """
+    likelihood = config.likelihood
     best = max((each.alignment_score for each in placed), default=-np.inf)
-    ratios = []
-    for each in placed:
-        ratio = -np.inf
-        if each.alignment_score >= best - likelihood.within:
-            found = evidence(each.T_cam_model, each.model, seen, likelihood, config.search.colour)
-            resized = abs(np.log(each.scale)) > config.search.least_size_change
-            ratio = log_likelihood(found, likelihood) - likelihood.other_size * resized
-        ratios.append(ratio)
-    return ratios
+
+    def ratio(each: Hypothesis) -> float:
+        if each.alignment_score < best - likelihood.within:
+            return -np.inf
+        found = evidence(each.T_cam_model, each.model, seen, likelihood, config.search.colour)
+        resized = abs(np.log(each.scale)) > config.search.least_size_change
+        return log_likelihood(found, likelihood) - likelihood.other_size * resized
+
+    placed, ratios = list(placed), [ratio(each) for each in placed]
+    for name, most in best_ratios(placed, ratios).items():
+        if most > likelihood.refined_from:
+            i = next(
+                i
+                for i, each in enumerate(placed)
+                if each.model.stored.name == name and ratios[i] == most
+            )
+            placed[i] = refined(placed[i])
+            ratios[i] = ratio(placed[i])
+    return placed, ratios
 
 
 def joint_log_likelihood(

@@ -17,14 +17,17 @@ from brrp_cli.geometry import transform_points
 from brrp_cli.ground_truth.scenes import Scene, true_mesh_in_camera
 from brrp_cli.observation.pixel_noise import pixel_noise
 from brrp_cli.observation.ray_samples import observe
+from brrp_cli.observation.sensor_noise import wave_deviation
 from brrp_cli.observation.strays import without_strays
 from brrp_cli.prior.store import Prior
 from brrp_cli.raycast import raycasting_scene
 from brrp_cli.registration.likelihood import PlacementEvidence, depth_ratio, evidence, see
 from brrp_cli.registration.model import search_model
 from brrp_cli.registration.pose_search import Hypothesis, search
+from brrp_cli.registration.refined import refined
 from brrp_cli.registration.scale_scan import observed_cloud
 from brrp_cli.registration.verification import Verifier
+from brrp_cli.registration.weigh import counted_once, judged
 from brrp_cli.retrieval.base import knows_depth, top_k, unknown
 from brrp_cli.retrieval.choose import choose_retriever
 from brrp_cli.seeds import child_rng, child_seed
@@ -82,6 +85,7 @@ def collect(
     cleaned = without_strays(frame, config.strays)
     seen = observe(cleaned, config.observation, 0)
     noise = pixel_noise(cleaned, seen.plane, hypotheses.sensor)
+    wave = wave_deviation(cleaned, seen.plane, hypotheses.sensor)
     masks = []
     for number, observation in seen.objects.items():
         mine = truth[(frame.segmap == number) & frame.valid]
@@ -107,10 +111,16 @@ def collect(
                 best,
             )
             found += [(each, share) for each in found_here]
-        best = max((each.alignment_score for each, _ in found), default=-np.inf)
+        placements, _ = judged(
+            [each for each, _ in found],
+            shown,
+            counted_once(hypotheses, knows_depth(retriever)),
+            lambda each, verifier=verifier: refined(each, verifier, wave, hypotheses),
+        )
+        best = max((each.alignment_score for each in placements), default=-np.inf)
         near = _nearness(scene, true_id, data_root, given)
         rows = []
-        for each, share in found:
+        for each, (_, share) in zip(placements, found, strict=True):
             if each.alignment_score < best - likelihood.within:
                 continue
             told = evidence(
