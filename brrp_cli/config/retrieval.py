@@ -96,11 +96,14 @@ class AlignmentConfig:
         of them reaches the score `enough`, so are the next `more`
     rounds : of so many objects, the most probable first; one that reaches the score `certain` ends
         them
+    last : objects that are refined once more in the end, the best by likeness and score; the more
+        points, the better shapes that are nearly alike are told apart
     least_points : of the object that have to be seen
     neutral : alignment score where nothing can be aligned: about what an object that is rightly
         found has; unaligned : that of objects that were not among those; lowest : a lower score
         counts as that one
-    search : how they are placed (registration/quick_alignment.py)
+    search : how they are placed (registration/quick_alignment.py); finest : its `fine` steps in the
+        end
     waves : deviations of the waves of the frame's depth (`sensor`), by which the true object may be
         off
     """
@@ -114,6 +117,7 @@ class AlignmentConfig:
     most: int = 24
     enough: float = share(0.88)
     more: int = 40
+    last: int = 14
     least_points: int = 20
     neutral: float = 0.85
     unaligned: float = 0.3
@@ -135,6 +139,9 @@ class AlignmentConfig:
             fine_points=250,
             fine_steps=6,
         )
+    )
+    finest: SearchConfig = field(
+        default_factory=lambda: SearchConfig(fine=2, fine_points=800, fine_steps=8)
     )
 
 

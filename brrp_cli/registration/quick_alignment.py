@@ -36,33 +36,51 @@ class FirstPlacements:
     score: float
 
 
-def alignment_scores(
+@dataclass(frozen=True)
+class Aligned:
+    """T_cam_model (B, 4, 4), refined placements of a model, best first, and the score of the best,
+    1 at best."""
+
+    T_cam_model: Array
+    score: float
+
+
+def aligned(
     models: Sequence[ModelGeometry],
     placements: Sequence[FirstPlacements],
     verifier: Verifier,
     config: SearchConfig,
-) -> Array:
-    """The alignment score (m,) that each model reaches from its first placements, 1 at best.
+) -> list[Aligned]:
+    """How well each model can be placed, from its first placements.
 
     All are refined coarsely; those that stay `beaten` behind the best of them are not refined
     further. Scores are compared with `seen_points` observed points, at last with `fine_points`.
     """
-    rough = [
+    found = [
         _coarse(model, first, verifier, config)
         for model, first in zip(models, placements, strict=True)
     ]
-    score = np.array([reached for _, reached in rough])
-    for i in np.flatnonzero(score >= score.max(initial=-np.inf) - config.beaten).tolist():
-        T = _refined(
-            rough[i][0],
-            models[i],
-            verifier,
-            config.fine_points,
-            config.fine_distance,
-            config.fine_steps,
-        )
-        score[i] = _scores(T, models[i], verifier, config, config.fine_points).max()
-    return score
+    best = max((each.score for each in found), default=-np.inf)
+    return [
+        finely(each, model, verifier, config) if each.score >= best - config.beaten else each
+        for each, model in zip(found, models, strict=True)
+    ]
+
+
+def finely(
+    placed: Aligned, model: ModelGeometry, verifier: Verifier, config: SearchConfig
+) -> Aligned:
+    """The `fine` best placements, refined with `fine_points`."""
+    points = config.fine_points
+    T = _refined(
+        placed.T_cam_model[: config.fine],
+        model,
+        verifier,
+        points,
+        config.fine_distance,
+        config.fine_steps,
+    )
+    return _best_first(T, _scores(T, model, verifier, config, points))
 
 
 def first_placements(
@@ -89,9 +107,8 @@ def first_placements(
 
 def _coarse(
     model: ModelGeometry, first: FirstPlacements, verifier: Verifier, config: SearchConfig
-) -> tuple[Array, float]:
-    """The `fine` best placements T_cam_model (B, 4, 4) after a coarse refinement, and the best
-    score."""
+) -> Aligned:
+    """The first placements after a coarse refinement."""
     T = _refined(
         first.T_cam_model,
         model,
@@ -100,9 +117,12 @@ def _coarse(
         config.coarse_distance,
         config.coarse_steps,
     )
-    score = _scores(T, model, verifier, config, config.seen_points)
-    order = np.argsort(-score, kind="stable")[: config.fine]
-    return np.asarray(T[order]), float(score[order[0]])
+    return _best_first(T, _scores(T, model, verifier, config, config.seen_points))
+
+
+def _best_first(T_cam_model: Array, score: Array) -> Aligned:
+    order = np.argsort(-score, kind="stable")
+    return Aligned(np.asarray(T_cam_model[order]), float(score[order[0]]))
 
 
 def raised_poses(

@@ -20,8 +20,10 @@ from brrp_cli.prior.shard import DISTANCES
 from brrp_cli.prior.store import Prior
 from brrp_cli.registration.model import BareModel
 from brrp_cli.registration.quick_alignment import (
+    Aligned,
     FirstPlacements,
-    alignment_scores,
+    aligned,
+    finely,
     first_placements,
 )
 from brrp_cli.registration.verification import Verifier
@@ -94,6 +96,7 @@ class SeenPart:
         self._verifier = verifier
         self._search = search
         self._first: dict[str, FirstPlacements] = {}
+        self._placed: dict[str, Aligned] = {}
 
     def first_scores(self, names: Sequence[str]) -> NDArray[np.float64]:
         """Alignment scores (m,) of the objects of these names before any is refined. Errors:
@@ -106,7 +109,21 @@ class SeenPart:
         """Alignment scores (m,) of objects that `first_scores` was asked for."""
         models = self._aligner.models(names)
         first = [self._first[name] for name in names]
-        return alignment_scores(models, first, self._verifier, self._search)
+        placed = aligned(models, first, self._verifier, self._search)
+        self._placed.update(zip(names, placed, strict=True))
+        return np.array([each.score for each in placed])
+
+    def last_scores(self, names: Sequence[str], last: SearchConfig) -> NDArray[np.float64]:
+        """Those (m,) of objects that `scores` was asked for, refined once more by `fine`,
+        `fine_points`, `fine_distance` and `fine_steps` of `last`."""
+        search = replace(last, alignment_score=self._search.alignment_score)
+        models = self._aligner.models(names)
+        return np.array(
+            [
+                finely(self._placed[name], model, self._verifier, search).score
+                for name, model in zip(names, models, strict=True)
+            ]
+        )
 
 
 def bare_model(arrays: dict[str, NDArray[Any]], points: int) -> BareModel:

@@ -139,6 +139,12 @@ class AppearanceRetriever:
                     break
             if alignment.max(initial=0.0) >= own.certain:
                 break
+        promise = np.log(np.maximum(likely, np.finfo(float).tiny)) + own.first * alignment
+        promise[alignment <= own.lowest] = -np.inf
+        last = np.argsort(-promise, kind="stable")[: own.last]
+        last = np.sort(last[np.isfinite(promise[last])])
+        found = seen.last_scores(self._named(look.rows[last]), own.finest)
+        alignment[last] = np.maximum(found, own.lowest)
         return replace(look, alignment=alignment)
 
     def _named(self, rows: NDArray[np.int64]) -> list[str]:
