@@ -148,20 +148,21 @@ class AlignmentConfig:
 @dataclass(frozen=True)
 class FusionConfig:
     r"""Inverse temperatures of the likenesses and of the alignment score, and the offset of the log
-    odds, which falls by `crowding` with the logarithm of the prior's size: see
-    brrp_cli/retrieval/score_fusion.py.
+    odds, which falls by `crowding` with the logarithm of the prior's size; at `points` observed
+    points the alignment score counts half: see brrp_cli/retrieval/score_fusion.py.
 
-    Fitted by tools/fit_appearance.py on made scenes, seeds 51150 to 51400, and priors of 274 and
-    1,196 objects; `offset` was then lowered from 10.48, so that fewer strangers are taken.
+    Chosen among a few dozen on made scenes, seeds 51300, 51400, 56100 and 56200, and priors of 274
+    and 1,196 objects, for the order and the calibration of objects of more than 500 pixels.
     docs/retrieval.md has the commands.
     """
 
-    colour: float = 42.79
-    pairs: float = 9.6
-    size: float = 0.16
-    alignment: float = between(21.88, 0.0, 1000.0)
-    offset: float = between(10.0, -100.0, 100.0)
+    colour: float = 40.0
+    pairs: float = 9.0
+    size: float = 0.15
+    alignment: float = between(40.0, 0.0, 1000.0)
+    offset: float = between(12.2, -100.0, 100.0)
     crowding: float = between(0.4, 0.0, 10.0)
+    points: float = between(150.0, 1.0, 1e6)
 
 
 @dataclass(frozen=True)

@@ -3,12 +3,12 @@
 For object i of the frame, stored object c and light g, with n stored objects:
 
     s_i(c, g) = offset + colour (B_i(c, g) - 1) + pairs (1 - h_i) (D_i(c) - 1) + size Z_i(c)
-                + alignment (A_i(c) - 1) - crowding ln n
+                + alignment (A_i(c) - 1) m_i / (m_i + points) - crowding ln n
 
 B and D are Bhattacharyya coefficients of colours and of point pairs, in [0, 1], h the hidden share
 of the silhouette, Z <= 0 what speaks against the size and A <= 1 the alignment score of c laid over
-what is seen. s is the log of the odds of c against
-"not in the prior" in light g. The light l of the scene is common to its objects, and that on each
+the m points that are seen: many shapes lie well over a few points. s is the log of the odds of c
+against "not in the prior" in light g. The light l of the scene is common to its objects, and that on each
 of them is near it:
 
     P(l | others) ~ P(l) prod_{j != i} sum_g P(g | l) (1 + sum_c exp s_j(c, g))
@@ -32,7 +32,7 @@ class Similarity:
 
     rows : (m,) which of the prior's n objects; colour : (g, m), one row for each light;
     pairs : (m,); size : (m,), 0 or less; alignment : (m,), or 1 for all;
-    hidden : share of the silhouette
+    hidden : share of the silhouette; points : observed, that objects are aligned with
     """
 
     rows: NDArray[np.int64]
@@ -40,6 +40,7 @@ class Similarity:
     pairs: NDArray[np.float32]
     size: NDArray[np.float32]
     hidden: float
+    points: int
     alignment: NDArray[np.float32] | float = 1.0
 
 
@@ -72,6 +73,7 @@ def believe(
 
 def _log_odds(item: Similarity, count: int, weights: FusionConfig) -> NDArray[np.float64]:
     shape = weights.pairs * (1 - item.hidden) * (item.pairs - 1) + weights.size * item.size
-    shape = shape + weights.alignment * (item.alignment - 1)
+    sure = item.points / (item.points + weights.points)
+    shape = shape + weights.alignment * sure * (item.alignment - 1)
     colour = weights.colour * (item.colour.astype(np.float64) - 1)
     return np.asarray(weights.offset + colour + shape - weights.crowding * np.log(count))

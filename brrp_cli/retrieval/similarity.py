@@ -95,6 +95,7 @@ def similarity(
         pairs=pair_likeness(seen.pairs, stored["pairs"], config),
         size=size_penalty(seen.size, stored["sizes"], seen.hidden, config),
         hidden=seen.hidden,
+        points=len(seen.points),
     )
 
 

@@ -12,13 +12,14 @@ WEIGHTS = FusionConfig(colour=20.0, pairs=20.0, size=0.5, offset=8.0, crowding=1
 FLAT, SAME = np.zeros(2), np.eye(2)
 
 
-def seen(colour, pairs=(1.0, 1.0), size=(0.0, 0.0), hidden=0.0):
+def seen(colour, pairs=(1.0, 1.0), size=(0.0, 0.0), hidden=0.0, points=10**9):
     return Similarity(
         rows=np.arange(2),
         colour=np.array(colour, np.float32),
         pairs=np.array(pairs, np.float32),
         size=np.array(size, np.float32),
         hidden=hidden,
+        points=points,
     )
 
 
@@ -61,9 +62,18 @@ def test_alignment_counts_for_each_object():
     np.testing.assert_allclose(half, odds / (1 + odds.sum()), rtol=1e-5)
 
 
+def test_alignment_with_few_points_counts_less():
+    """At `points` points half: log odds 8 - 5 * 0.1 - ln 2 and 8 - 5 * 0.6 - ln 2."""
+    weights = replace(WEIGHTS, alignment=10.0, points=300.0)
+    item = replace(seen([[1.0, 1.0]], points=300), alignment=np.array([0.9, 0.4], np.float32))
+    found = believe([item], np.zeros(1), np.eye(1), 2, weights)[0]
+    odds = np.exp([7.5, 5.0]) / 2
+    np.testing.assert_allclose(found, odds / (1 + odds.sum()), rtol=1e-5)
+
+
 def test_objects_that_were_not_looked_at_have_no_probability():
     item = Similarity(
-        np.array([4, 1]), *(np.ones(s, np.float32) for s in ((2, 2), 2)), np.zeros(2), 0
+        np.array([4, 1]), *(np.ones(s, np.float32) for s in ((2, 2), 2)), np.zeros(2), 0, 1000
     )
     found = believe([item], FLAT, SAME, 6, WEIGHTS)[0]
     assert (found > 0).tolist() == [False, True, False, False, True, False]
