@@ -119,10 +119,7 @@ def _correlated(rest: Array, whole: Array, reach: int, config: SensorConfig) -> 
     """How many patches of a map (n, m) err as one: the sum of its autocorrelation over shifts of
     up to `reach` patches, where it is over `config.least_correlation`. `whole` (n, m) is 1 where
     the map has a value."""
-    from scipy.signal import fftconvolve
-
-    products = fftconvolve(rest, rest[::-1, ::-1])
-    pairs = fftconvolve(whole, whole[::-1, ::-1])
+    products, pairs = _shifted_products(rest), _shifted_products(whole)
     middle = tuple(slice(max(n - 1 - reach, 0), n + reach) for n in rest.shape)
     products, pairs = products[middle], pairs[middle]
     covariance = np.where(pairs > config.patch_points, products / np.maximum(pairs, 1), 0.0)
@@ -130,3 +127,15 @@ def _correlated(rest: Array, whole: Array, reach: int, config: SensorConfig) -> 
         return 1.0
     correlation = covariance / covariance.max()
     return float(max(1.0, correlation[correlation > config.least_correlation].sum()))
+
+
+def _shifted_products(values: Array) -> Array:
+    """(2n - 1, 2m - 1) sums of products of a map (n, m) with itself, for each shift of one over the
+    other, by Fourier transforms. `scipy.signal` has a function for it, and takes a second to
+    import."""
+    from scipy.fft import irfftn, next_fast_len, rfftn
+
+    whole = [2 * n - 1 for n in values.shape]
+    fast = [next_fast_len(n, real=True) for n in whole]
+    found = irfftn(rfftn(values, fast) * rfftn(values[::-1, ::-1], fast), fast)
+    return np.asarray(found[: whole[0], : whole[1]])
