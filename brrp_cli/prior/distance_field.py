@@ -71,9 +71,11 @@ class DistanceField:
         left, right = edges[1] - edges[0], edges[3] - edges[2]
         near, far = edges[0] + y * left, edges[2] + y * right
         up_near, up_far = rise[0] + y * (rise[1] - rise[0]), rise[2] + y * (rise[3] - rise[2])
-        along = far - near
-        value = near + x * along
-        slope = np.stack([along, left + x * (right - left), up_near + x * (up_far - up_near)])
+        slope = np.empty((3, len(x)), np.float32)
+        np.subtract(far, near, out=slope[0])
+        value = near + x * slope[0]
+        np.add(left, x * (right - left), out=slope[1])
+        np.add(up_near, x * (up_far - up_near), out=slope[2])
         slope /= np.float32(self.spacing)
         beyond = np.flatnonzero(off.any(axis=0))
         if len(beyond):
@@ -92,19 +94,28 @@ class DistanceField:
         four lower corners, (n,) each, along y, then x; how much more those above them are; and how
         far off the grid each lies (3, n), in spacings."""
         shape = np.array(self.values.shape, dtype=np.int32)[:, None]
-        at = (points - self.lower[:, None].astype(np.float32)) / np.float32(self.spacing)
+        at = points - self.lower[:, None].astype(np.float32)
+        at /= np.float32(self.spacing)
         within = np.clip(at, 0, (shape - 1).astype(np.float32))
-        cell = np.minimum(within.astype(np.int32), shape - 2)
+        cell = within.astype(np.int32)
+        np.minimum(cell, shape - 2, out=cell)
         on_x, on_y = int(shape[1, 0] * shape[2, 0]), int(shape[2, 0])
-        first = cell[0] * on_x + cell[1] * on_y + cell[2]
+        # What `take` takes without a copy.
+        first = (cell[0] * on_x + cell[1] * on_y + cell[2]).astype(np.intp)
         nodes = self.values.ravel()
         # Along z, then y, then x; the slope along an axis is the difference along it.
-        low = [nodes.take(first + step) for step in (0, on_y, on_x, on_x + on_y)]
-        rise = [
-            nodes.take(first + (step + 1)) - start
-            for step, start in zip((0, on_y, on_x, on_x + on_y), low, strict=True)
-        ]
-        return within - cell, low, rise, at - within
+        low, rise = [], []
+        for step in (0, on_y, on_x, on_x + on_y):
+            corner = first + step
+            low.append(nodes.take(corner))
+            corner += 1
+            above = nodes.take(corner)
+            above -= low[-1]
+            rise.append(above)
+        at -= within
+        # Less the whole numbers as floats: with integers, NumPy would go on in double precision.
+        within -= cell.astype(np.float32)
+        return within, low, rise, at
 
 
 def distance_field(mesh: trimesh.Trimesh, config: FieldConfig) -> DistanceField:
