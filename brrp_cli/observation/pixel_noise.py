@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from brrp_cli.config import SensorConfig
 from brrp_cli.frames.frame import BACKGROUND, Frame
+from brrp_cli.geometry import lengths
 from brrp_cli.observation.sensor_noise import MEDIAN_ABSOLUTE, depth_deviation
 from brrp_cli.observation.support_plane import Plane, plane_frame
 
@@ -71,13 +72,23 @@ def _second_differences(depth: Array, config: SensorConfig) -> Array:
 
 def _at_jumps(depth: Array, K: NDArray[np.floating], config: SensorConfig) -> NDArray[np.bool_]:
     """(H, W) within `config.bleed` radians of where depth jumps by more than `config.jump`."""
-    from scipy.ndimage import binary_dilation, maximum_filter, minimum_filter
+    from scipy.ndimage import binary_dilation
 
-    farthest = maximum_filter(np.nan_to_num(depth, nan=-np.inf), 3)
-    nearest = minimum_filter(np.nan_to_num(depth, nan=np.inf), 3)
+    farthest = _of_neighbours(np.nan_to_num(depth, nan=-np.inf), np.maximum)
+    nearest = _of_neighbours(np.nan_to_num(depth, nan=np.inf), np.minimum)
     with np.errstate(invalid="ignore"):
         jump = np.isfinite(farthest) & (farthest - nearest > config.jump)
     return np.asarray(binary_dilation(jump, iterations=max(1, round(config.bleed * K[0, 0]) - 1)))
+
+
+def _of_neighbours(image: Array, of: np.ufunc) -> Array:
+    """The greatest or the least (H, W) of each pixel of an image (H, W) and the eight around it."""
+    for _ in range(2):
+        found = image.copy()
+        of(found[1:], image[:-1], out=found[1:])
+        of(found[:-1], image[1:], out=found[:-1])
+        image = found.T
+    return image
 
 
 def _table_waves(
@@ -93,7 +104,7 @@ def _table_waves(
     # Feet of objects and the table's edge are no waves.
     table = binary_erosion(table, iterations=max(1, round(config.table_margin * frame.K[0, 0])))
     points, height = frame.points[table].astype(np.float64), height[table]
-    along = np.abs(points @ plane.normal / np.linalg.norm(points, axis=1))
+    along = np.abs(points @ plane.normal / lengths(points))
     cells = np.floor(points @ plane_frame(plane)[:2, :3].T / config.patch).astype(np.int64)
     if len(cells) < config.patch_points:
         return None
