@@ -54,7 +54,6 @@ class LearnedShape:
 
     def logits(self, points: NDArray[np.floating]) -> Floats:
         """Log odds (n,) that points (n, 3), metres, camera frame, are inside."""
-        import torch
 
         if not len(points):
             return np.empty(0, np.float32)
