@@ -83,6 +83,12 @@ def lengths(vectors: Array) -> Array:
     return np.sqrt(square, out=square)
 
 
+def bell(ratios: Array) -> Array:
+    """exp(-ratios^2 / 2), but no less than exp(-80): what is smaller float32 holds as a denormal
+    number, which is slow, or not at all."""
+    return np.exp(np.maximum(-0.5 * np.square(ratios), -80.0))
+
+
 def normalise(vectors: Array) -> NDArray[np.float64]:
     """Unit vectors along `vectors` (..., 3); zero vectors stay zero."""
     length = np.linalg.norm(vectors, axis=-1, keepdims=True)
