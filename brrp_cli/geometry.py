@@ -10,6 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.floating]
+# Cells of a grid for each point, up to which they are counted.
+_COUNTED = 4
 
 
 def transform_points(T_target_source: Array, points: Array) -> Array:
@@ -44,8 +46,13 @@ def cells_of(points: NDArray[np.floating], cell: float) -> NDArray[np.int64]:
         return np.empty(0, np.int64)
     cells = np.floor(points / cell).astype(np.int64)
     cells -= cells.min(axis=0)
-    index = np.ravel_multi_index(tuple(cells.T), tuple(cells.max(axis=0) + 1))
-    return np.unique(index, return_inverse=True)[1].reshape(-1)
+    size = cells.max(axis=0) + 1
+    index = np.ravel_multi_index(tuple(cells.T), tuple(size))
+    if np.prod(size, dtype=np.float64) > _COUNTED * len(points):
+        return np.unique(index, return_inverse=True)[1].reshape(-1)
+    # Counted rather than sorted, in a quarter of the time.
+    held = np.bincount(index) > 0
+    return (np.cumsum(held) - 1)[index]
 
 
 def backproject(depth: Array, K: Array) -> NDArray[np.float32]:
@@ -65,6 +72,21 @@ def project(points: Array, K: Array) -> NDArray[np.float64]:
     """Points (n, 3), camera frame, to pixels (n, 2) as (u, v)."""
     z = points[:, 2:3]
     return points[:, :2] / z * np.array([K[0, 0], K[1, 1]]) + np.array([K[0, 2], K[1, 2]])
+
+
+def lengths(vectors: Array) -> Array:
+    """(n,) of vectors (n, 3), as `np.linalg.norm` has them, and a few times as fast."""
+    x, y, z = vectors.T
+    square = x * x
+    square += y * y
+    square += z * z
+    return np.sqrt(square, out=square)
+
+
+def bell(ratios: Array) -> Array:
+    """exp(-ratios^2 / 2), but no less than exp(-80): what is smaller float32 holds as a denormal
+    number, which is slow, or not at all."""
+    return np.exp(np.maximum(-0.5 * np.square(ratios), -80.0))
 
 
 def normalise(vectors: Array) -> NDArray[np.float64]:

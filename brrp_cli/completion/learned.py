@@ -32,6 +32,9 @@ if TYPE_CHECKING:
 
 Floats = NDArray[np.float32]
 
+# So many points at once: what is known of them stays in the cache.
+CHUNK = 8_192
+
 FORMAT = "brrp completion 1"
 NAME = "shapes.safetensors"
 
@@ -51,17 +54,22 @@ class LearnedShape:
 
     def logits(self, points: NDArray[np.floating]) -> Floats:
         """Log odds (n,) that points (n, 3), metres, camera frame, are inside."""
-        import torch
 
         if not len(points):
             return np.empty(0, np.float32)
+        found = [self._thought(points[a : a + CHUNK]) for a in range(0, len(points), CHUNK)]
+        return np.asarray(np.concatenate(found) + np.float32(self.part.config.bias))
+
+    def _thought(self, points: NDArray[np.floating]) -> Floats:
+        import torch
+
         network = self.network
         places = torch.from_numpy(self.volume.places(points))
         lengths = torch.from_numpy(point_features(np.asarray(points, np.float64), self.part))
         with torch.no_grad():
             found = network.at(self.features, places[None])[0]
-            thought = network.decide(network.scaled(lengths), found).numpy()
-        return np.asarray(thought + np.float32(self.part.config.bias))
+            thought: Floats = network.decide(network.scaled(lengths), found).numpy()
+        return thought
 
 
 def save_shapes(network: ShapeNetwork, training: dict[str, Any], path: Path) -> None:

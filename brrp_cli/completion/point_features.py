@@ -26,8 +26,9 @@ NOWHERE = np.iinfo(np.int64).min
 
 
 def point_features(points: Array, part: VisiblePart) -> Features:
-    """(n, `COUNT`) of points (n, 3), metres, camera frame. Lengths stand in tenths of `far` and in
-    the object's sizes; without a plane, heights count as in the middle of the object."""
+    """(n, `COUNT`) of points (n, 3), metres, camera frame, feature by feature in memory. Lengths
+    stand in tenths of `far` and in the object's sizes; without a plane, heights count as in the
+    middle of the object."""
     frame, size, config = part.frame, part.size, part.config
     far, ratio, thin = config.far, config.ratio, config.thin
     pixel, visible = pixel_numbers(points, frame)
@@ -102,9 +103,15 @@ def point_features(points: Array, part: VisiblePart) -> Features:
         *(2 * part.rectangle.half / size),
         part.free,
     ]
-    columns = [np.clip(one / size, -ratio, ratio) for one in each + mirrored]
-    columns += [np.clip(one, -far, far) / (far / 10) for one in each]
-    columns += [
+    found = np.empty((COUNT, len(points)), np.float32)
+    row = 0
+    for one in each + mirrored:
+        np.clip(one / size, -ratio, ratio, out=found[row], casting="same_kind")
+        row += 1
+    for one in each:
+        np.divide(np.clip(one, -far, far), far / 10, out=found[row], casting="same_kind")
+        row += 1
+    for one in (
         label == part.object_id,
         label == BACKGROUND,
         np.clip(behind / (silhouette + thin), -ratio, ratio),
@@ -114,9 +121,11 @@ def point_features(points: Array, part: VisiblePart) -> Features:
         normal @ part.ahead,
         np.abs(normal @ part.across),
         normal @ part.up,
-    ]
-    columns += [np.full(len(points), one) for one in whole]
-    return np.stack(columns, axis=1).astype(np.float32)
+        *whole,
+    ):
+        found[row] = one
+        row += 1
+    return found.T
 
 
 def _steps(part: VisiblePart) -> list[NDArray[np.floating]]:
@@ -135,7 +144,8 @@ def _behind(
     """How far (n,) points (n, 3) lie behind the measured depth, metres; 0 where there is none."""
     measured = part.frame.depth.ravel()[pixel]
     behind = np.where(visible, points[:, 2] - measured, 0.0)
-    return np.clip(np.nan_to_num(behind), -part.config.far, part.config.far)
+    behind[np.isnan(behind)] = 0.0
+    return np.clip(behind, -part.config.far, part.config.far, out=behind)
 
 
 def _image(image: Array, part: VisiblePart) -> list[NDArray[np.floating]]:

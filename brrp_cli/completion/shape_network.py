@@ -76,7 +76,9 @@ class ShapeNetwork(nn.Module):
 
     def decide(self, scaled: Tensor, found: Tensor) -> Tensor:
         """Logits (...) from scaled lengths (..., 72) and features (..., F)."""
-        logits: Tensor = self.point(torch.cat([scaled, found], dim=-1))[..., 0]
+        # Feature by feature, as both come: to turn them over takes as long as a layer.
+        inputs = torch.cat([scaled.mT, found.mT], dim=-2).mT
+        logits: Tensor = self.point(inputs)[..., 0]
         return logits / self.temperature
 
 

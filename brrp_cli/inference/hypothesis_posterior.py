@@ -121,14 +121,16 @@ class HypothesisPosterior:
 
     def probability_volume(self, axes: Axes) -> NDArray[np.float32]:
         """Occupancy probability (nx, ny, nz) on a grid of camera-frame coordinates, metres."""
-        return np.tensordot(self.shares, self.particle_volumes(axes), axes=1).astype(np.float32)
+        return np.tensordot(self.shares.astype(np.float32), self.particle_volumes(axes), axes=1)
 
     def particle_volumes(self, axes: Axes) -> NDArray[np.float32]:
         """Occupancy (P, nx, ny, nz) of each particle on a grid of camera-frame coordinates,
         metres."""
         logits = self.correction.logit_volume(axes)
         for number, mean in enumerate(self.means):
-            logits[self.which == number] += mean.volume(axes)
+            volume = mean.volume(axes)
+            for particle in np.flatnonzero(self.which == number):
+                logits[particle] += volume
         return np.asarray(torch.from_numpy(logits).sigmoid_().numpy())
 
     def mean_occupancy(self, logits: NDArray[np.floating]) -> NDArray[np.float32]:

@@ -77,7 +77,11 @@ def infer_correction(
             return norm
         rows = torch.randint(len(targets), (config.batch,), generator=generator).to(device)
         return norm - config.lambda_observed * logistic_score(
-            weights, phi.rows(rows), targets[rows], mean[:, rows], counts[:, rows]
+            weights,
+            phi.rows(rows),
+            targets.index_select(0, rows),
+            mean.index_select(1, rows),
+            counts.index_select(1, rows),
         )
 
     start = config.start * torch.randn(len(which), grid.dimension, generator=generator)

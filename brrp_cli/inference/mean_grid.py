@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from brrp_cli.hdf5 import SharedParts
 
 Array = NDArray[np.float64]
+_AXES = range(3)
 
 
 @dataclass(frozen=True)
@@ -47,9 +48,23 @@ class MeanGrid:
         return np.asarray(map_coordinates(values, at, order=1, mode="constant", cval=self.outside))
 
     def volume(self, axes: Axes) -> NDArray[np.float32]:
-        """m (nx, ny, nz) on a grid along the camera's axes, metres."""
-        nodes = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
-        return self.logits(nodes.reshape(-1, 3)).reshape(nodes.shape[:3])
+        """m (nx, ny, nz) on a grid along the camera's axes, metres: `logits` one axis after the
+        other, a tenth of the steps."""
+        values = self.values.astype(np.float32)
+        within = []
+        for number, axis in enumerate(axes):
+            last = values.shape[number] - 1
+            at = (np.asarray(axis, dtype=np.float64) - self.lower[number]) / self.spacing
+            within.append((at >= 0) & (at <= last))
+            low = np.clip(np.floor(at).astype(np.int64), 0, max(last - 1, 0))
+            share = (at - low).astype(np.float32).reshape([-1 if i == number else 1 for i in _AXES])
+            below, above = values.take(low, number), values.take(np.minimum(low + 1, last), number)
+            above -= below
+            above *= share
+            above += below
+            values = above
+        inside = within[0][:, None, None] & within[1][:, None] & within[2]
+        return np.where(inside, values, np.float32(self.outside))
 
     def write(self, group: h5py.Group, shared: SharedParts) -> None:
         """Attributes lower (3), spacing, outside; values (nx, ny, nz) float16."""

@@ -7,6 +7,7 @@ seen of one side tells of the side that was not; some to leaning; little to all 
 
 from __future__ import annotations
 
+from functools import cache
 from itertools import product
 
 import numpy as np
@@ -48,9 +49,14 @@ def _powers(u: Array) -> Array:
     return np.stack([np.ones_like(u.T), u.T, u.T**2, u.T**3], axis=1)
 
 
+@cache
+def _lattice_slopes() -> Array:
+    return slopes(_LATTICE)
+
+
 def unfolded(bend: Array, steepest: float) -> Array:
     """A bend (3, K), made smaller where its slopes in the box exceed `steepest`, under 1."""
-    steep = np.linalg.norm(np.einsum("ak,nki->nai", bend, slopes(_LATTICE)), axis=(1, 2)).max()
+    steep = np.linalg.norm(np.einsum("ak,nki->nai", bend, _lattice_slopes()), axis=(1, 2)).max()
     return np.asarray(bend * min(1.0, steepest / max(float(steep), 1e-9)))
 
 

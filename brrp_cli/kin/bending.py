@@ -4,6 +4,7 @@ Gauss-Newton steps over place, scales and a smooth bend."""
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +23,30 @@ UNKNOWNS = FIRST + 3 * bend.TERMS
 
 
 @dataclass(frozen=True)
+class BoxPoints:
+    """Points u (n, 3) of a stored shape's box, with what a bend is made of there, (n, K) and
+    (n, K, 3): it stays what it is however the shape is bent, and is computed once."""
+
+    u: Array
+
+    @cached_property
+    def terms(self) -> Array:
+        """As `bend.terms` has them."""
+        return bend.terms(self.u)
+
+    @cached_property
+    def slopes(self) -> Array:
+        """As `bend.slopes` has them."""
+        return bend.slopes(self.u)
+
+    def rows(self, chosen: NDArray[np.int64]) -> BoxPoints:
+        """Those of the points."""
+        part = BoxPoints(self.u[chosen])
+        part.__dict__["terms"] = self.terms[chosen]
+        return part
+
+
+@dataclass(frozen=True)
 class BentFit:
     """x_plane = Rz(turn) diag(s, s, 1) diag(half) v + middle, with v = u + w(u) and
     s = 1 + taper v_z (placement.py, bend.py).
@@ -37,22 +62,22 @@ class BentFit:
     taper: float
     bend: Array
 
-    def placed(self, u: Array) -> Array:
-        """(n, 3) metres, frame of the plane, of points u (n, 3) of the stored shape's box."""
-        v = u + bend.terms(u) @ self.bend.T
+    def placed(self, points: BoxPoints) -> Array:
+        """(n, 3) metres, frame of the plane, of points of the stored shape's box."""
+        v = points.u + points.terms @ self.bend.T
         return (v * self._sizes(v)) @ self._turned.T + self.middle
 
-    def normals(self, u: Array, stored: Array) -> Array:
+    def normals(self, points: BoxPoints, stored: Array) -> Array:
         """(n, 3) unit, frame of the plane, where the stored shape's normals along u are (n, 3)."""
-        v = u + bend.terms(u) @ self.bend.T
-        A = np.eye(3) + np.einsum("ak,nkj->naj", self.bend, bend.slopes(u))
+        v = points.u + points.terms @ self.bend.T
+        A = np.eye(3) + np.einsum("ak,nkj->naj", self.bend, points.slopes)
         A = A * self._sizes(v)[:, :, None]
         found = np.linalg.solve(A.transpose(0, 2, 1), stored[..., None])[..., 0] @ self._turned.T
         return np.asarray(found / np.linalg.norm(found, axis=1, keepdims=True))
 
-    def along(self, u: Array, way: Array) -> Array:
-        """(E, n): how far points u (n, 3) go along `way` (n, 3) with each unknown."""
-        v = u + bend.terms(u) @ self.bend.T
+    def along(self, points: BoxPoints, way: Array) -> Array:
+        """(E, n): how far points go along `way` (n, 3) with each unknown."""
+        v = points.u + points.terms @ self.bend.T
         sizes = self._sizes(v)
         local = way @ self._turned
         each = local * v * sizes
@@ -65,8 +90,8 @@ class BentFit:
                 (each[:, 0] + each[:, 1]) / sizes[:, 0] * self.half[0] * np.clip(v[:, 2], -1, 1),
             ]
         )
-        curved = np.einsum("na,nk->akn", local * sizes, bend.terms(u))
-        return np.concatenate([first, curved.reshape(-1, len(u))])
+        curved = np.einsum("na,nk->akn", local * sizes, points.terms)
+        return np.concatenate([first, curved.reshape(-1, len(v))])
 
     def stepped(self, step: Array, config: KinConfig) -> BentFit:
         """After a step (E,), no part of which is longer than a step of `refined` may be."""
@@ -106,13 +131,14 @@ def bent(
     surface, normals : (n, 3) points of the stored shape's surface and its normals there, along u
     """
     precision = bend.prior_precision(fit.stored_half, config)
-    cost, H, g = _system(fit, surface, normals, evidence, precision, config)
+    points = BoxPoints(surface)
+    cost, H, g = _system(fit, points, normals, evidence, precision, config)
     damping = config.bend_damping
     for _ in range(config.bend_steps):
         held = H + damping * np.diag(np.diag(H)) + unknowns.LEAST * np.eye(UNKNOWNS)
         step = -np.asarray(np.linalg.solve(held, g), dtype=np.float64)
         tried = fit.stepped(step, config)
-        found = _system(tried, surface, normals, evidence, precision, config)
+        found = _system(tried, points, normals, evidence, precision, config)
         if found[0] < cost:
             fit, (cost, H, g), damping = tried, found, damping / 4
         else:
@@ -122,7 +148,7 @@ def bent(
 
 def _system(
     fit: BentFit,
-    surface: Array,
+    surface: BoxPoints,
     stored_normals: Array,
     evidence: Evidence,
     precision: Array,
@@ -148,7 +174,7 @@ def _system(
         ratio = 1 / (1 + (off / config.robust) ** 2)
         share = 1 / config.sigma**2 / len(seen)
         cost += share * float((off**2 * ratio).sum()) / 2
-        _add(H, g, -fit.along(surface[row], way), off, share * ratio**2)
+        _add(H, g, -fit.along(surface.rows(row), way), off, share * ratio**2)
     amount, way = ways_out(points, evidence, config)
     there = np.flatnonzero(amount)
     if len(there):
@@ -156,7 +182,7 @@ def _system(
         off = amount[there]
         slack = np.minimum(1, config.robust / off)
         cost += share * float((off**2 * slack * (2 - slack)).sum()) / 2
-        _add(H, g, -fit.along(surface[there], way[there]), off, share * slack)
+        _add(H, g, -fit.along(surface.rows(there), way[there]), off, share * slack)
     return cost, H, g
 
 

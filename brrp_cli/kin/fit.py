@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from brrp_cli.config import KinConfig
-from brrp_cli.geometry import transform_points
+from brrp_cli.geometry import bell, transform_points
 from brrp_cli.kin.evidence import Evidence
 from brrp_cli.kin.library import Library
 from brrp_cli.kin.placement import Placements, distance_and_slopes
@@ -58,7 +59,7 @@ def judged(placements: Placements, evidence: Evidence, library: Library, config:
         placements, np.concatenate([evidence.seen, evidence.free]), library
     )[0]
     on, at = distance[:, : len(evidence.seen)], distance[:, len(evidence.seen) :]
-    near = np.exp(-0.5 * np.square(on) / (config.near**2 + evidence.noise**2)).mean(axis=1)
+    near = bell(on / math.hypot(config.near, evidence.noise)).mean(axis=1)
     far = (np.minimum(np.abs(on), config.far) / config.far).mean(axis=1)
     lost = (np.abs(on) > config.lost).mean(axis=1)
     inside = np.clip((-at - config.tolerance) / config.slope, 0, 1).sum(axis=1) / max(

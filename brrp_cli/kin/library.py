@@ -60,7 +60,8 @@ class Fields:
         at = (points - self.lower[number].T[:, :, None]) / spacing
         within = np.clip(at, 0, (shape - 1).astype(np.float32))
         cell = np.minimum(within.astype(np.int32), shape - 2)
-        x, y, z = within - cell
+        # Less the whole numbers as floats: with integers, NumPy would go on in double precision.
+        x, y, z = within - cell.astype(np.float32)
         on_y = shape[2].astype(np.int64)
         on_x = on_y * shape[1]
         first = self.first[number][:, None] + cell[0] * on_x + cell[1] * on_y + cell[2]
@@ -74,8 +75,11 @@ class Fields:
         left, right = edges[1] - edges[0], edges[3] - edges[2]
         near, far = edges[0] + y * left, edges[2] + y * right
         up_near, up_far = rise[0] + y * (rise[1] - rise[0]), rise[2] + y * (rise[3] - rise[2])
-        value = near + x * (far - near)
-        slope = np.stack([far - near, left + x * (right - left), up_near + x * (up_far - up_near)])
+        slope = np.empty((3, *x.shape), np.float32)
+        np.subtract(far, near, out=slope[0])
+        value = near + x * slope[0]
+        np.add(left, x * (right - left), out=slope[1])
+        np.add(up_near, x * (up_far - up_near), out=slope[2])
         slope /= spacing
         off = (at - within) * spacing
         beyond = off.any(axis=0)

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brrp_cli.config import KinConfig
+from brrp_cli.geometry import bell
 from brrp_cli.kin.evidence import Evidence
 from brrp_cli.kin.library import Library
 from brrp_cli.kin.placement import Placements, coarse_distance, joined
@@ -87,7 +88,7 @@ def _score(
     seen, free = evidence.seen[: config.coarse_seen], evidence.free[: config.coarse_free]
     distance = coarse_distance(placements, np.concatenate([seen, free]), library)
     on, at = distance[:, : len(seen)], distance[:, len(seen) :]
-    near = np.exp(-0.5 * (on / config.coarse_near) ** 2).mean(axis=1)
+    near = bell(on / config.coarse_near).mean(axis=1)
     far = np.minimum(np.abs(on) / (config.coarse_far * config.coarse_near), 1).mean(axis=1)
     inside = np.clip(-at / config.coarse_near, 0, 1).sum(axis=1) / max(len(free), 1)
     log = np.log(placements.half / library.half[placements.stance])

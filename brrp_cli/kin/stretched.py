@@ -12,11 +12,11 @@ from scipy.sparse.csgraph import connected_components
 from brrp_cli.config import KinConfig
 from brrp_cli.geometry import similarity
 from brrp_cli.kin.bend import TERMS
-from brrp_cli.kin.bending import BentFit, bent
+from brrp_cli.kin.bending import BentFit, BoxPoints, bent
 from brrp_cli.kin.evidence import Evidence
 from brrp_cli.kin.library import Library
 from brrp_cli.kin.placement import Placements
-from brrp_cli.prior.distance_field import distance_field
+from brrp_cli.prior.distance_field import quick_distance_field
 from brrp_cli.prior.parameters import FieldConfig
 from brrp_cli.prior.shape import StoredShape
 
@@ -47,9 +47,9 @@ class BentShape:
         import trimesh
 
         T = self.T_plane_shape
-        vertices = (self.fit.placed(self.u) - T[:3, 3]) @ T[:3, :3]
+        vertices = (self.fit.placed(BoxPoints(self.u)) - T[:3, 3]) @ T[:3, :3]
         mesh = trimesh.Trimesh(vertices, self.faces, process=False)
-        field = distance_field(mesh, FieldConfig(config.field_nodes, config.margin))
+        field = quick_distance_field(mesh, FieldConfig(config.field_nodes, config.margin))
         return StoredShape(vertices.astype(np.float32), self.faces, self.colours, field)
 
 

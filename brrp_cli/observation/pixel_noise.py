@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from brrp_cli.config import SensorConfig
 from brrp_cli.frames.frame import BACKGROUND, Frame
+from brrp_cli.geometry import lengths
 from brrp_cli.observation.sensor_noise import MEDIAN_ABSOLUTE, depth_deviation
 from brrp_cli.observation.support_plane import Plane, plane_frame
 
@@ -71,13 +72,23 @@ def _second_differences(depth: Array, config: SensorConfig) -> Array:
 
 def _at_jumps(depth: Array, K: NDArray[np.floating], config: SensorConfig) -> NDArray[np.bool_]:
     """(H, W) within `config.bleed` radians of where depth jumps by more than `config.jump`."""
-    from scipy.ndimage import binary_dilation, maximum_filter, minimum_filter
+    from scipy.ndimage import binary_dilation
 
-    farthest = maximum_filter(np.nan_to_num(depth, nan=-np.inf), 3)
-    nearest = minimum_filter(np.nan_to_num(depth, nan=np.inf), 3)
+    farthest = _of_neighbours(np.nan_to_num(depth, nan=-np.inf), np.maximum)
+    nearest = _of_neighbours(np.nan_to_num(depth, nan=np.inf), np.minimum)
     with np.errstate(invalid="ignore"):
         jump = np.isfinite(farthest) & (farthest - nearest > config.jump)
     return np.asarray(binary_dilation(jump, iterations=max(1, round(config.bleed * K[0, 0]) - 1)))
+
+
+def _of_neighbours(image: Array, of: np.ufunc) -> Array:
+    """The greatest or the least (H, W) of each pixel of an image (H, W) and the eight around it."""
+    for _ in range(2):
+        found = image.copy()
+        of(found[1:], image[:-1], out=found[1:])
+        of(found[:-1], image[1:], out=found[:-1])
+        image = found.T
+    return image
 
 
 def _table_waves(
@@ -93,7 +104,7 @@ def _table_waves(
     # Feet of objects and the table's edge are no waves.
     table = binary_erosion(table, iterations=max(1, round(config.table_margin * frame.K[0, 0])))
     points, height = frame.points[table].astype(np.float64), height[table]
-    along = np.abs(points @ plane.normal / np.linalg.norm(points, axis=1))
+    along = np.abs(points @ plane.normal / lengths(points))
     cells = np.floor(points @ plane_frame(plane)[:2, :3].T / config.patch).astype(np.int64)
     if len(cells) < config.patch_points:
         return None
@@ -119,10 +130,7 @@ def _correlated(rest: Array, whole: Array, reach: int, config: SensorConfig) -> 
     """How many patches of a map (n, m) err as one: the sum of its autocorrelation over shifts of
     up to `reach` patches, where it is over `config.least_correlation`. `whole` (n, m) is 1 where
     the map has a value."""
-    from scipy.signal import fftconvolve
-
-    products = fftconvolve(rest, rest[::-1, ::-1])
-    pairs = fftconvolve(whole, whole[::-1, ::-1])
+    products, pairs = _shifted_products(rest), _shifted_products(whole)
     middle = tuple(slice(max(n - 1 - reach, 0), n + reach) for n in rest.shape)
     products, pairs = products[middle], pairs[middle]
     covariance = np.where(pairs > config.patch_points, products / np.maximum(pairs, 1), 0.0)
@@ -130,3 +138,15 @@ def _correlated(rest: Array, whole: Array, reach: int, config: SensorConfig) -> 
         return 1.0
     correlation = covariance / covariance.max()
     return float(max(1.0, correlation[correlation > config.least_correlation].sum()))
+
+
+def _shifted_products(values: Array) -> Array:
+    """(2n - 1, 2m - 1) sums of products of a map (n, m) with itself, for each shift of one over the
+    other, by Fourier transforms. `scipy.signal` has a function for it, and takes a second to
+    import."""
+    from scipy.fft import irfftn, next_fast_len, rfftn
+
+    whole = [2 * n - 1 for n in values.shape]
+    fast = [next_fast_len(n, real=True) for n in whole]
+    found = irfftn(rfftn(values, fast) * rfftn(values[::-1, ::-1], fast), fast)
+    return np.asarray(found[: whole[0], : whole[1]])

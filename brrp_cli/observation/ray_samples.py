@@ -122,10 +122,13 @@ def ray_samples(
     columns = np.ascontiguousarray(points.T)
     length = np.sqrt(np.square(columns, dtype=np.float64).sum(axis=0)).astype(np.float32)
     direction = columns / length
-    along = centers.astype(np.float32) @ direction  # (k, n): where each ray passes each centre
-    across = np.square(centers).sum(axis=1)[:, None] - np.square(along, dtype=np.float64)
     # Rays that pass no centre give no sample; the margin is for float32.
-    crossing = (across < (radius + 1e-3) ** 2).any(axis=0)
+    crossing, across = np.zeros(len(length), dtype=bool), np.empty(len(length))
+    along = centers.astype(np.float32) @ direction  # (k, n): where each ray passes each centre
+    for row, square in zip(along, np.square(centers).sum(axis=1), strict=True):
+        np.square(row, out=across, dtype=np.float64)
+        np.subtract(square, across, out=across)
+        crossing |= across < (radius + 1e-3) ** 2
     length, direction = length[crossing], direction[:, crossing]
 
     reach = np.linalg.norm(centers, axis=-1)
@@ -134,11 +137,12 @@ def ray_samples(
     kept = []
     for index in range(first, last + 1):
         start = np.float32(index * width)
-        reaching = length > start
+        reaching = np.flatnonzero(length > start)
         span = np.minimum(length[reaching] - start, np.float32(width))
         t = start + rng.random(len(span), dtype=np.float32) * span
-        draws = direction[:, reaching] * t
-        kept.append(draws[:, _near_any(draws.T, centers, radius)])
+        draws = direction.take(reaching, axis=1)
+        draws *= t
+        kept.append(draws.take(np.flatnonzero(_near_any(draws.T, centers, radius)), axis=1))
     samples = np.ascontiguousarray(np.concatenate(kept, axis=1).T)
     if len(samples) > config.max_ray_samples:
         rows = child_rng(seed, "rays", "subset").choice(
@@ -170,9 +174,16 @@ def _near_any(
     points: NDArray[np.float32], centers: NDArray[np.float64], radius: float
 ) -> NDArray[np.bool_]:
     near = np.zeros(len(points), dtype=bool)
+    # One piece of memory for all steps: to ask for new ones takes longer than they do.
+    square, along = np.empty((2, len(points)), np.float32)
     for center in centers.astype(np.float32):
-        x, y, z = (points.T[axis] - center[axis] for axis in range(3))
-        near |= x * x + y * y + z * z < radius**2
+        for axis in range(3):
+            into = square if axis == 0 else along
+            np.subtract(points[:, axis], center[axis], out=into)
+            into *= into
+            if axis:
+                square += along
+        near |= square < radius**2
     return near
 
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from brrp_cli.config import SensorConfig
 from brrp_cli.frames.frame import BACKGROUND, Frame
 from brrp_cli.frames.last_frame import kept_for_last_frame
-from brrp_cli.geometry import cells_of
+from brrp_cli.geometry import cells_of, lengths
 from brrp_cli.observation.support_plane import Plane, plane_frame
 
 Array = NDArray[np.float64]
@@ -38,7 +38,7 @@ def wave_deviation(frame: Frame, plane: Plane | None, config: SensorConfig) -> f
     height = plane.signed_distance(points)
     near = np.abs(height) < config.table_reach
     points, height = points[near], height[near]
-    along = points @ plane.normal / np.linalg.norm(points, axis=1)
+    along = points @ plane.normal / lengths(points)
     on_plane = points @ plane_frame(plane)[:2, :3].T
     cell = cells_of(on_plane, config.patch)
     count = np.bincount(cell)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import weakref
 from dataclasses import replace
 
 import numpy as np
@@ -16,12 +17,21 @@ from brrp_cli.frames.frame import Frame
 log = logging.getLogger(__name__)
 
 
+# The last frame that has none, and by what. What is left of a frame has no strays either.
+_clean: tuple[weakref.ref[Frame], StrayConfig] | None = None
+
+
 def without_strays(frame: Frame, config: StrayConfig) -> Frame:
-    """The frame, with no depth at pixels that their mask holds by mistake.
+    """The frame, with no depth at pixels that their mask holds by mistake; the frame itself where
+    there are none.
 
     Masks that are a pixel too wide hold what stands behind the object, and cameras mix the depths
     of both. One such pixel moves the middle of the object's bounding box by half its distance.
     """
+    global _clean
+    known = _clean
+    if known is not None and known[0]() is frame and known[1] == config:
+        return frame
     stray = np.zeros(frame.shape, dtype=bool)
     for object_id in frame.object_ids:
         own = frame.valid & (frame.segmap == object_id)
@@ -37,9 +47,11 @@ def without_strays(frame: Frame, config: StrayConfig) -> Frame:
                     object_id,
                     found.sum(),
                 )
-    if not stray.any():
-        return frame
-    return replace(frame, points=np.where(stray[..., None], np.float32(np.nan), frame.points))
+    if stray.any():
+        points = np.where(stray[..., None], np.float32(np.nan), frame.points)
+        frame = replace(frame, points=points)
+    _clean = weakref.ref(frame), config
+    return frame
 
 
 def stray_pixels(depth: NDArray[np.floating], config: StrayConfig) -> NDArray[np.bool_]:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from brrp_cli.config import ObservationConfig
 from brrp_cli.dependencies import import_open3d, seeded_open3d
-from brrp_cli.geometry import normalise, similarity
+from brrp_cli.geometry import lengths, normalise, similarity
 from brrp_cli.seeds import child_seed
 
 
@@ -44,7 +44,7 @@ def fit_plane(
     below a table whose masks hold smeared pixels or things on the floor.
     Returns None where fewer than `config.plane_min_points` points are near or agree on a plane.
     """
-    near = points[np.linalg.norm(points - toward, axis=-1) < config.plane_radius]
+    near = points[lengths(points - toward) < config.plane_radius]
     if len(near) < config.plane_min_points:
         return None
     centred = near.astype(np.float64) - toward

@@ -16,6 +16,13 @@ if TYPE_CHECKING:
 
 # Three rays a node: one that grazes an edge is outvoted.
 RAYS = 3
+# Of a field that is made quickly: how many nodes from the surface it is exact, how wide a face may
+# be, in nodes, and how often neighbours are asked for a nearer point of the surface.
+BAND = 2
+WIDEST = 3.0
+ROUNDS = 3
+# Of the node in the middle of three along each axis; itself first.
+_NEIGHBOURS = ((1, 1, 1), (0, 1, 1), (2, 1, 1), (1, 0, 1), (1, 2, 1), (1, 1, 0), (1, 1, 2))
 
 
 @dataclass(frozen=True)
@@ -64,9 +71,11 @@ class DistanceField:
         left, right = edges[1] - edges[0], edges[3] - edges[2]
         near, far = edges[0] + y * left, edges[2] + y * right
         up_near, up_far = rise[0] + y * (rise[1] - rise[0]), rise[2] + y * (rise[3] - rise[2])
-        along = far - near
-        value = near + x * along
-        slope = np.stack([along, left + x * (right - left), up_near + x * (up_far - up_near)])
+        slope = np.empty((3, len(x)), np.float32)
+        np.subtract(far, near, out=slope[0])
+        value = near + x * slope[0]
+        np.add(left, x * (right - left), out=slope[1])
+        np.add(up_near, x * (up_far - up_near), out=slope[2])
         slope /= np.float32(self.spacing)
         beyond = np.flatnonzero(off.any(axis=0))
         if len(beyond):
@@ -85,40 +94,125 @@ class DistanceField:
         four lower corners, (n,) each, along y, then x; how much more those above them are; and how
         far off the grid each lies (3, n), in spacings."""
         shape = np.array(self.values.shape, dtype=np.int32)[:, None]
-        at = (points - self.lower[:, None].astype(np.float32)) / np.float32(self.spacing)
+        at = points - self.lower[:, None].astype(np.float32)
+        at /= np.float32(self.spacing)
         within = np.clip(at, 0, (shape - 1).astype(np.float32))
-        cell = np.minimum(within.astype(np.int32), shape - 2)
+        cell = within.astype(np.int32)
+        np.minimum(cell, shape - 2, out=cell)
         on_x, on_y = int(shape[1, 0] * shape[2, 0]), int(shape[2, 0])
-        first = cell[0] * on_x + cell[1] * on_y + cell[2]
+        # What `take` takes without a copy.
+        first = (cell[0] * on_x + cell[1] * on_y + cell[2]).astype(np.intp)
         nodes = self.values.ravel()
         # Along z, then y, then x; the slope along an axis is the difference along it.
-        low = [nodes.take(first + step) for step in (0, on_y, on_x, on_x + on_y)]
-        rise = [
-            nodes.take(first + (step + 1)) - start
-            for step, start in zip((0, on_y, on_x, on_x + on_y), low, strict=True)
-        ]
-        return within - cell, low, rise, at - within
+        low, rise = [], []
+        for step in (0, on_y, on_x, on_x + on_y):
+            corner = first + step
+            low.append(nodes.take(corner))
+            corner += 1
+            above = nodes.take(corner)
+            above -= low[-1]
+            rise.append(above)
+        at -= within
+        # Less the whole numbers as floats: with integers, NumPy would go on in double precision.
+        within -= cell.astype(np.float32)
+        return within, low, rise, at
 
 
 def distance_field(mesh: trimesh.Trimesh, config: FieldConfig) -> DistanceField:
     """The field of a closed mesh on about `config.nodes` nodes, which reach `config.margin` beyond
     its bounding box. The longer the box, the coarser: a flat object gets a fine grid."""
-    o3d = import_open3d()
-    low, high = mesh.bounds[0] - config.margin, mesh.bounds[1] + config.margin
+    lower, spacing, nodes = _nodes(np.asarray(mesh.bounds), config)
+    scene = _scene(mesh)
+    query = import_open3d().core.Tensor(nodes.reshape(-1, 3))
+    distance = scene.compute_distance(query, nthreads=1).numpy()
+    inside = scene.compute_occupancy(query, nthreads=1, nsamples=RAYS).numpy() > 0.5
+    values = np.where(inside, -distance, distance).reshape(nodes.shape[:3])
+    return DistanceField(lower, spacing, _as_kept(values))
+
+
+def quick_distance_field(mesh: trimesh.Trimesh, config: FieldConfig) -> DistanceField:
+    """`distance_field`, in a third of the time: the same within two nodes of the surface, and a
+    little too long beyond, on average by a few thousandths of the distance.
+
+    Exact are nodes that lie within two of a vertex or of the middle of a face; all others take the
+    nearest of the points of the surface that belong to the exact ones around. A mesh with faces
+    wider than three nodes gets the exact field.
+    """
+    lower, spacing, nodes = _nodes(np.asarray(mesh.bounds), config)
+    corners = np.asarray(mesh.vertices)[mesh.faces]
+    widest = np.square(corners - np.roll(corners, 1, axis=1)).sum(axis=2).max()
+    if widest > (WIDEST * spacing) ** 2:
+        return distance_field(mesh, config)
+    from scipy.ndimage import distance_transform_edt, maximum_filter
+
+    shape = nodes.shape[:3]
+    exact = np.zeros(shape, np.bool_)
+    on_surface = np.concatenate([np.asarray(mesh.vertices), corners.mean(axis=1)])
+    exact[tuple(np.rint((on_surface - lower) / spacing).astype(np.int64).T)] = True
+    exact = maximum_filter(exact, 2 * BAND + 1)
+    scene, query = _scene(mesh), import_open3d().core.Tensor(nodes[exact])
+    closest = np.zeros_like(nodes)
+    closest[exact] = scene.compute_closest_points(query, nthreads=1)["points"].numpy()
+    inside = np.zeros(shape, np.bool_)
+    inside[exact] = scene.compute_occupancy(query, nthreads=1, nsamples=RAYS).numpy() > 0.5
+
+    nearest = distance_transform_edt(~exact, return_distances=False, return_indices=True)
+    number = np.ravel_multi_index(tuple(nearest), shape)
+    # Between a node and the nearest exact one there is no surface.
+    inside = inside.ravel()[number]
+    number = _nearest_around(number, ~exact, nodes, closest.reshape(-1, 3))
+    distance = np.linalg.norm(nodes - closest.reshape(-1, 3)[number], axis=3)
+    return DistanceField(lower, spacing, _as_kept(np.where(inside, -distance, distance)))
+
+
+def _nearest_around(
+    number: NDArray[np.int64],
+    asked: NDArray[np.bool_],
+    nodes: NDArray[np.float32],
+    closest: NDArray[np.float32],
+) -> NDArray[np.int64]:
+    """Which of the points `closest` (m, 3) each node takes: `number` (nx, ny, nz), and at the nodes
+    that are `asked` the nearest of its own and of those of its neighbours, `ROUNDS` times."""
+    rows = np.flatnonzero(asked)
+    at = nodes.reshape(-1, 3)[rows]
+    number = number.copy()
+    for _ in range(ROUNDS):
+        around = np.pad(number, 1, mode="edge")
+        best, square = number.ravel()[rows], np.full(len(rows), np.inf, np.float32)
+        for x, y, z in _NEIGHBOURS:
+            nx, ny, nz = number.shape
+            one = around[x : x + nx, y : y + ny, z : z + nz].ravel()[rows]
+            apart = at - closest.take(one, axis=0)
+            length = np.einsum("ni,ni->n", apart, apart)
+            best = np.where(length < square, one, best)
+            square = np.minimum(square, length)
+        number.ravel()[rows] = best
+    return number
+
+
+def _nodes(
+    bounds: NDArray[np.float64], config: FieldConfig
+) -> tuple[NDArray[np.float64], float, NDArray[np.float32]]:
+    """The first node (3,), the spacing and all nodes (nx, ny, nz, 3) over a box (2, 3)."""
+    low, high = bounds[0] - config.margin, bounds[1] + config.margin
     spacing = float((np.prod(high - low) / config.nodes) ** (1 / 3))
     shape = np.ceil((high - low) / spacing).astype(np.int64) + 1
     lower = (low + high) / 2 - (shape - 1) * spacing / 2
     axes = [start + spacing * np.arange(n) for start, n in zip(lower, shape, strict=True)]
-    nodes = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
+    nodes = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
+    return lower, spacing, np.ascontiguousarray(nodes, dtype=np.float32)
 
+
+def _scene(mesh: trimesh.Trimesh) -> Any:
+    o3d = import_open3d()
     scene = o3d.t.geometry.RaycastingScene(nthreads=1)
     scene.add_triangles(
         o3d.core.Tensor(np.asarray(mesh.vertices, dtype=np.float32)),
         o3d.core.Tensor(np.asarray(mesh.faces, dtype=np.uint32)),
     )
-    query = o3d.core.Tensor(np.ascontiguousarray(nodes, dtype=np.float32))
-    distance = scene.compute_distance(query, nthreads=1).numpy()
-    inside = scene.compute_occupancy(query, nthreads=1, nsamples=RAYS).numpy() > 0.5
-    values = np.where(inside, -distance, distance).reshape(tuple(shape))
-    # As the shard keeps it, so that what was just made is what will be read.
-    return DistanceField(lower, spacing, values.astype(np.float16).astype(np.float32))
+    return scene
+
+
+def _as_kept(values: NDArray[np.floating]) -> NDArray[np.float32]:
+    """As the shard keeps it, so that what was just made is what will be read."""
+    return values.astype(np.float16).astype(np.float32)

@@ -44,12 +44,15 @@ def best_and_different(turns: Array, score: Array, count: int, apart: float) -> 
     from all better ones: the front of a box is not to be crowded out by its back, turned a
     little."""
     order = np.argsort(-score, kind="stable")
+    # The trace of the turn between two is 1 + 2 cos of its angle.
+    flat = turns.reshape(-1, 9)
+    near = (flat @ flat.T - 1) / 2 > np.cos(apart) + 1e-9
+    crowded = np.zeros(len(turns), dtype=np.bool_)
     different: list[int] = []
     for row in order:
-        # The trace of the turn between two is 1 + 2 cos of its angle.
-        cosine = (np.einsum("kij,ij->k", turns[different], turns[row]) - 1) / 2
-        if (cosine <= np.cos(apart) + 1e-9).all():
+        if not crowded[row]:
             different.append(int(row))
+            crowded |= near[row]
         if len(different) == count:
             break
     taken = set(different)

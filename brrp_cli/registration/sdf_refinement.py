@@ -57,23 +57,23 @@ def _step(
 ) -> Array:
     """Turn, shift and change of log size (B, 7), about the model's middle, of points (3, B, n)."""
     _, batch, count = points.shape
-    p = points.reshape(3, -1)
-    value, slope = model.distance_and_gradient(p)
+    value, slope = model.distance_and_gradient(points.reshape(3, -1))
     pulls = np.abs(value) < distance
     slope *= pulls
+    p, along = points, slope.reshape(points.shape)
     unknowns = 7 if resize else 6
-    rows = np.empty((unknowns, batch * count), np.float32)
+    rows = np.empty((batch, unknowns, count), np.float32)
     for i, (j, k) in enumerate(((1, 2), (2, 0), (0, 1))):
-        rows[i] = p[j] * slope[k] - p[k] * slope[j]
-    rows[3:6] = slope
+        np.multiply(p[j], along[k], out=rows[:, i])
+        rows[:, i] -= p[k] * along[j]
+    rows[:, 3:6] = along.swapaxes(0, 1)
     if resize:
         # Distances count in metres of the camera frame: in the model's, which shrink as it is taken
         # to be larger, every noise would make it so.
-        rows[6] = (p * slope).sum(axis=0) - value * pulls
-    rows = np.ascontiguousarray(rows.reshape(unknowns, batch, count).swapaxes(0, 1))
+        rows[:, 6] = (p * along).sum(axis=0) - (value * pulls).reshape(batch, count)
     normal = (rows @ rows.mT).astype(np.float64)
     fall = rows @ value.reshape(batch, count, 1)
-    trace = np.trace(normal, axis1=1, axis2=2)[:, None, None]
+    trace = np.einsum("bii->b", normal)[:, None, None]
     # Nothing pulls where the trace is 0.
     normal += (DAMPING * trace / unknowns + (trace == 0)) * np.eye(unknowns)
     step = np.zeros((batch, 7))
@@ -85,12 +85,15 @@ def _step(
 def _motion(step: Array) -> Array:
     """(B, 4, 4) that turns by step[:, :3] (Rodrigues), shifts by step[:, 3:6] and resizes by
     exp(step[:, 6])."""
-    angle = np.linalg.norm(step[:, :3], axis=1)[:, None, None]
-    x, y, z = (step[:, :3] / np.maximum(angle[:, 0], 1e-12)).T
-    zero = np.zeros_like(x)
-    K = np.stack([zero, -z, y, z, zero, -x, -y, x, zero], axis=1).reshape(-1, 3, 3)
-    T = np.tile(np.eye(4), (len(step), 1, 1))
-    T[:, :3, :3] += np.sin(angle) * K + (1 - np.cos(angle)) * (K @ K)
-    T[:, :3, :3] *= np.exp(step[:, 6])[:, None, None]
+    angle = np.sqrt(np.square(step[:, :3]).sum(axis=1))
+    x, y, z = step[:, :3].T / np.maximum(angle, 1e-12)
+    K = np.zeros((len(step), 3, 3))
+    K[:, 0, 1], K[:, 0, 2], K[:, 1, 2] = -z, y, -x
+    K[:, 1, 0], K[:, 2, 0], K[:, 2, 1] = z, -y, x
+    sine, versine = np.sin(angle), 1 - np.cos(angle)
+    T = np.zeros((len(step), 4, 4))
+    turn = sine[:, None, None] * K + versine[:, None, None] * (K @ K) + np.eye(3)
+    T[:, :3, :3] = turn * np.exp(step[:, 6])[:, None, None]
     T[:, :3, 3] = step[:, 3:6]
+    T[:, 3, 3] = 1
     return T

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cache
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +18,7 @@ from scipy.spatial.transform import Rotation
 
 from brrp_cli.config import SearchConfig, TurnConfig
 from brrp_cli.geometry import as_transforms, cells_of, transform_points
+from brrp_cli.prior.shape import StoredShape
 from brrp_cli.registration.colour_pose import (
     best_and_different,
     textured_agreement,
@@ -65,6 +67,8 @@ def turned(placed: Hypothesis, verifier: Verifier, patch: float, config: SearchC
     T = different(T[near_enough[near[near_enough] <= near.min() + turn.worse]], config)
     T = np.concatenate([placed.T_cam_model[None], T])
     T = T[_as_much_explained(T, placed, verifier, config)]
+    if len(T) == 1:
+        return Turned(placed, np.empty((0, 4, 4)))
     exact = np.minimum(_distances(T, placed, points, exact=True), turn.far)
     worse, doubt = _worse_than(0, exact, points, patch)
     better = worse + turn.gain * doubt
@@ -75,15 +79,24 @@ def turned(placed: Hypothesis, verifier: Verifier, patch: float, config: SearchC
     return Turned(best, np.asarray(T[alike]))
 
 
+# Of stored shapes, by what they were compared with: it takes as long as a step of the search.
+_TURNS: WeakKeyDictionary[StoredShape, tuple[TurnConfig, Array]] = WeakKeyDictionary()
+
+
 def _nearly_itself(placed: Hypothesis, config: TurnConfig) -> Array:
     """(K, 4, 4) turns about the middle, by `config.apart` at least, that bring the surface back to
-    within `config.itself` of itself, on average."""
+    within `config.itself` of itself, on average. Of an object that is held it is found once."""
     model = placed.model
+    known = _TURNS.get(model.stored.shape)
+    if known is not None and known[0] == config:
+        return known[1]
     surface = model.surface[: config.surface_points]
     every = _every_turn(config)
     moved = np.einsum("kij,nj->kni", every, surface)
     off = np.abs(model.signed_distance(moved.reshape(-1, 3))).reshape(len(every), -1).mean(axis=1)
-    return as_transforms(every[off < config.itself])
+    found = as_transforms(every[off < config.itself])
+    _TURNS[model.stored.shape] = config, found
+    return found
 
 
 @cache

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from brrp_cli.config import VerificationConfig
 from brrp_cli.frames.frame import Frame
 from brrp_cli.frames.projection import depth_behind
+from brrp_cli.geometry import bell
 from brrp_cli.observation.support_plane import Plane
 from brrp_cli.registration.model import ModelGeometry
 
@@ -59,7 +60,7 @@ class Verifier:
         in_model = _placed(T_model_cam, seen)
         distance = np.abs(model.distance(in_model.reshape(3, -1)))
         distance = distance.reshape(in_model.shape[1:]) * scale[:, None].astype(np.float32)
-        near = np.exp(-0.5 * (distance / config.near) ** 2).mean(axis=1)
+        near = bell(distance / config.near).mean(axis=1)
         far = (np.minimum(distance, config.far) / config.far).mean(axis=1)
         return np.asarray(near - config.distance * far)
 

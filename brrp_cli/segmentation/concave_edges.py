@@ -51,22 +51,23 @@ def hollow_angles(points: Array, normals: Array, config: ConcaveEdgesConfig) -> 
     """
     height, width = points.shape[:2]
     reach = config.reach
-    pad = ((reach, reach), (reach, reach), (0, 0))
-    all_points = np.pad(points, pad, constant_values=np.nan)
-    all_normals = np.pad(normals, pad, constant_values=np.nan)
+    pad = ((0, 0), (reach, reach), (reach, reach))
+    # The axis comes first: long contiguous rows are what NumPy is fast on.
+    all_points = np.pad(np.moveaxis(points, -1, 0), pad, constant_values=np.nan)
+    all_normals = np.pad(np.moveaxis(normals, -1, 0), pad, constant_values=np.nan)
     least = np.ones((height, width))
     for down, right in ((0, reach), (reach, 0), (3, 3), (3, -3)):
         sides = []
         for sign in (1, -1):
             row, column = reach + sign * down, reach + sign * right
-            window = np.s_[row : row + height, column : column + width]
+            window = np.s_[:, row : row + height, column : column + width]
             sides.append((all_points[window], all_normals[window]))
         (first, first_normal), (second, second_normal) = sides
         between = first - second
         with np.errstate(invalid="ignore"):
-            cosine = _dot(first_normal, second_normal)
-            hollow = _dot(first_normal - second_normal, between) < 0
-            near = _dot(between, between) < config.near**2
+            cosine = _sum_of_products(first_normal, second_normal)
+            hollow = _sum_of_products(first_normal - second_normal, between) < 0
+            near = _sum_of_products(between, between) < config.near**2
             found = hollow & near & (cosine < least)
         least[found] = cosine[found]
     return np.degrees(np.arccos(np.clip(least, -1, 1)))
@@ -89,7 +90,16 @@ def colour_edges(rgb: NDArray[np.uint8], config: ConcaveEdgesConfig) -> Array:
 
 
 def _dot(first: Array, second: Array) -> Array:
-    return np.asarray(np.einsum("...i,...i->...", first, second))
+    """Of vectors (..., 3)."""
+    return _sum_of_products(np.moveaxis(first, -1, 0), np.moveaxis(second, -1, 0))
+
+
+def _sum_of_products(first: Array, second: Array) -> Array:
+    """Of vectors (3, ...)."""
+    found = first[0] * second[0]
+    found += first[1] * second[1]
+    found += first[2] * second[2]
+    return np.asarray(found)
 
 
 def depth_jumps(depth: Array, K: Array, config: ConcaveEdgesConfig) -> NDArray[np.bool_]:

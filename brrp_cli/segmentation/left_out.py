@@ -58,10 +58,15 @@ def left_out(
 def border_share(mask: NDArray[np.bool_]) -> float:
     """The part of a mask's outline that lies on the image's border; 0 of an empty one."""
     ndimage = import_library("scipy.ndimage")
-    frame = np.ones(mask.shape, dtype=bool)
-    frame[1:-1, 1:-1] = False
-    outline = mask & ~ndimage.binary_erosion(mask)
-    return float((outline & frame).sum() / max(int(outline.sum()), 1))
+    rows, columns = (np.flatnonzero(mask.any(axis=axis)) for axis in (1, 0))
+    if not len(rows):
+        return 0.0
+    # All but the box around it is no part of it, as is what lies beyond the image.
+    box = np.s_[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
+    inner = np.zeros(mask.shape, dtype=bool)
+    inner[1:-1, 1:-1] = True
+    outline = mask[box] & ~ndimage.binary_erosion(mask[box])
+    return float((outline & ~inner[box]).sum() / max(int(outline.sum()), 1))
 
 
 def told(reasons: Mapping[int, str]) -> str:

@@ -62,10 +62,11 @@ def refine_borders(
 
 
 def _colours(rgb: NDArray[np.uint8], levels: int) -> NDArray[np.int64]:
-    """(H, W, 3) colours of (H, W, 3) in so many levels."""
+    """(H, W) numbers of colours (H, W, 3) in so many levels."""
     ndimage = import_library("scipy.ndimage")
     smooth = ndimage.uniform_filter(rgb, size=(3, 3, 1))
-    return smooth.astype(np.int64) * levels // 256
+    level = (np.arange(256) * levels // 256)[smooth]
+    return np.asarray((level[..., 0] * levels + level[..., 1]) * levels + level[..., 2])
 
 
 def _log_ratio(
@@ -75,9 +76,9 @@ def _log_ratio(
     ndimage = import_library("scipy.ndimage")
     shares = []
     for mask in (inside, outside):
-        count = np.zeros((config.levels,) * 3)
-        np.add.at(count, tuple(codes[mask].T), 1.0)
+        count = np.bincount(codes[mask], minlength=config.levels**3).astype(np.float64)
+        count = count.reshape((config.levels,) * 3)
         count = ndimage.gaussian_filter(count, config.blur, mode="constant")
         shares.append(count / count.sum() + config.floor)
-    ratio = np.log(shares[0] / shares[1])[tuple(np.moveaxis(codes, -1, 0))]
+    ratio = np.log(shares[0] / shares[1]).ravel()[codes]
     return np.asarray(ndimage.gaussian_filter(ratio, 1.0))

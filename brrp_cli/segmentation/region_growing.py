@@ -22,7 +22,9 @@ def grow(
     free = candidates & (labels == 0)
     if not labels.any() or not free.any():
         return labels
-    _, nearest = spatial.cKDTree(points[labels > 0]).query(points[free], distance_upper_bound=reach)
+    # Asked about few points: a tree that is made quickly.
+    tree = spatial.cKDTree(points[labels > 0], balanced_tree=False, compact_nodes=False)
+    _, nearest = tree.query(points[free], distance_upper_bound=reach)
     grown = labels.copy()
     grown[free] = np.append(labels[labels > 0], 0)[nearest]
     return grown

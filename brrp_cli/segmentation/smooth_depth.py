@@ -75,7 +75,7 @@ def _averaged(inverse: Array, scale: Array, radius: int) -> Array:
     width = inverse.shape[1]
     # Band by band: what is read and written 48 times stays in the cache.
     for top in range(0, len(inverse), _BAND):
-        own, by = inverse[top : top + _BAND], scale[top : top + _BAND]
+        own, by = inverse[top : top + _BAND], -np.square(scale[top : top + _BAND])
         total, weights = np.zeros_like(own), np.ones_like(own)
         difference, weight = np.empty_like(own), np.empty_like(own)
         for row, column in np.ndindex(2 * radius + 1, 2 * radius + 1):
@@ -83,10 +83,9 @@ def _averaged(inverse: Array, scale: Array, radius: int) -> Array:
                 continue
             window = np.s_[top + row : top + row + len(own), column : column + width]
             np.subtract(padded[window], own, out=difference)
-            np.multiply(difference, by, out=weight)
-            np.square(weight, out=weight)
-            np.minimum(weight, _FARTHEST, out=weight)
-            np.negative(weight, out=weight)
+            np.square(difference, out=weight)
+            np.multiply(weight, by, out=weight)
+            np.maximum(weight, -_FARTHEST, out=weight)
             np.exp(weight, out=weight)
             weights += weight
             # Of the difference, which is small: float32 keeps what it means.

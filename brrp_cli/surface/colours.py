@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brrp_cli.reconstruction import METRES, Surface
+from brrp_cli.surface.viridis import viridis
 
 # Share of a scene's vertices whose spread lies under the top of the colour scale: a few vertices
 # far from every sample would otherwise flatten everything else into one colour.
@@ -31,9 +32,7 @@ def scale_top(surfaces: Sequence[Surface]) -> float:
 
 def spread_colours(spreads: NDArray[np.floating], top: float) -> NDArray[np.uint8]:
     """Colours (n, 4) RGBA of spreads (n,): dark is sure, bright is unsure (viridis)."""
-    from matplotlib import colormaps
-
-    return np.asarray(colormaps["viridis"](np.asarray(spreads) / top, bytes=True))
+    return viridis(np.asarray(spreads) / top)
 
 
 def spread_meaning(surfaces: Sequence[Surface]) -> str:

@@ -33,7 +33,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import norm
+from scipy.special import ndtri
 
 from brrp_cli.config import SurfaceConfig
 from brrp_cli.inference.hypothesis_posterior import HypothesisPosterior
@@ -151,7 +151,7 @@ def _around_stored_mesh(
         return None
     shape = placed(posterior, number)
     by_pose = simultaneous(shape, confidence, config) * shape.deviations
-    band = np.hypot(by_pose, norm.ppf((1 + confidence) / 2) * config.fidelity)
+    band = np.hypot(by_pose, ndtri((1 + confidence) / 2) * config.fidelity)
     moved = np.einsum("ni,ni->n", best.vertices - through.vertices, through.normals)
     # Where a vertex is a corner, its faces move by less than itself.
     corners = band * shape.shape.corners

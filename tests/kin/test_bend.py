@@ -11,7 +11,7 @@ from table_scene import TABLE, in_camera, photograph, placed
 from brrp_cli.config import preset
 from brrp_cli.geometry import transform_points
 from brrp_cli.kin import bend
-from brrp_cli.kin.bending import UNKNOWNS, BentFit, bent
+from brrp_cli.kin.bending import UNKNOWNS, BentFit, BoxPoints, bent
 from brrp_cli.kin.evidence import gather
 from brrp_cli.kin.ways_out import ways_out
 from brrp_cli.shapes import solids
@@ -87,9 +87,9 @@ def test_points_go_along_each_unknown_as_the_difference_quotient_says(unknown):
     step = np.zeros(UNKNOWNS)
     step[unknown] = 1e-5
     loose = replace(KIN, bend_steepest=0.99)
-    ends = [fit.stepped(sign * step, loose).placed(u) for sign in (1, -1)]
+    ends = [fit.stepped(sign * step, loose).placed(BoxPoints(u)) for sign in (1, -1)]
     quotient = np.einsum("ni,ni->n", (ends[0] - ends[1]) / 2e-5, way)
-    assert fit.along(u, way)[unknown] == pytest.approx(quotient, abs=2e-4)
+    assert fit.along(BoxPoints(u), way)[unknown] == pytest.approx(quotient, abs=2e-4)
 
 
 def test_normals_are_those_of_the_bent_surface():
@@ -97,9 +97,9 @@ def test_normals_are_those_of_the_bent_surface():
     fit = some_fit(taper=0.0)
     u = RNG.uniform(-0.8, 0.8, (40, 3))
     u[:, 2] = 0.5
-    normal = fit.normals(u, np.tile([0.0, 0.0, 1.0], (40, 1)))
+    normal = fit.normals(BoxPoints(u), np.tile([0.0, 0.0, 1.0], (40, 1)))
     for step in (np.array([1e-5, 0, 0]), np.array([0, 1e-5, 0])):
-        tangent = fit.placed(u + step) - fit.placed(u - step)
+        tangent = fit.placed(BoxPoints(u + step)) - fit.placed(BoxPoints(u - step))
         tangent /= np.linalg.norm(tangent, axis=1, keepdims=True)
         assert np.einsum("ni,ni->n", tangent, normal) == pytest.approx(0, abs=1e-4)
 
@@ -144,7 +144,7 @@ def test_a_cup_becomes_one_with_other_sides_on_the_far_side_too():
 
     def off(one):
         """Metres along the true normals."""
-        apart = one.placed(u) - truth.vertices
+        apart = one.placed(BoxPoints(u)) - truth.vertices
         return np.abs(np.einsum("ni,ni->n", apart, truth.vertex_normals))
 
     for rows in (np.ones(len(u), bool), bulging):

@@ -11,7 +11,7 @@ import trimesh
 from stored_example import example, with_field
 
 from brrp_cli.errors import PriorError
-from brrp_cli.prior.distance_field import DistanceField, distance_field
+from brrp_cli.prior.distance_field import DistanceField, distance_field, quick_distance_field
 from brrp_cli.prior.pack import pack, unpack
 from brrp_cli.prior.parameters import FieldConfig
 from brrp_cli.prior.shard import open_shard, read_stored, write_shard
@@ -71,6 +71,37 @@ def test_a_box_that_stands_askew_and_away_from_the_origin():
     points = local @ T[:3, :3].T + T[:3, 3]
     assert np.abs(field.signed_distance(points) - box_distance(local, half)).max() < (
         field.spacing / 2
+    )
+
+
+@pytest.mark.parametrize(
+    "mesh",
+    [
+        trimesh.creation.icosphere(subdivisions=4, radius=0.9),
+        trimesh.creation.box((1.6, 1.0, 0.4)).subdivide_to_size(0.1),
+        trimesh.creation.annulus(r_min=0.75, r_max=0.8, height=1.2, sections=64).subdivide_to_size(
+            0.1
+        ),
+    ],
+    ids=["ball", "box", "tube"],
+)
+def test_the_quick_field_is_the_same_near_the_surface_and_almost_so_beyond(mesh):
+    field, quick = distance_field(mesh, CONFIG), quick_distance_field(mesh, CONFIG)
+    np.testing.assert_array_equal(quick.lower, field.lower)
+    np.testing.assert_array_equal(np.sign(quick.values), np.sign(field.values))
+    more = np.abs(quick.values) - np.abs(field.values)
+    near = np.abs(field.values) < 1.5 * field.spacing
+    assert 0.05 < near.mean() < 0.9
+    # A point of the surface that is found on another way differs in its last bit.
+    assert np.abs(more[near]).max() < 1e-3 * field.spacing
+    assert more.min() > -1e-3 * field.spacing
+    assert more.max() < field.spacing / 2
+
+
+def test_faces_that_are_wider_than_nodes_make_no_difference():
+    mesh = trimesh.creation.box((1.6, 1.0, 0.4))
+    np.testing.assert_array_equal(
+        quick_distance_field(mesh, CONFIG).values, distance_field(mesh, CONFIG).values
     )
 
 
