@@ -8,8 +8,8 @@ For object i of the frame, stored object c and light g, with n stored objects:
 B and D are Bhattacharyya coefficients of colours and of point pairs, in [0, 1], h the hidden share
 of the silhouette, Z <= 0 what speaks against the size and A <= 1 the alignment score of c laid over
 the m points that are seen: many shapes lie well over a few points. s is the log of the odds of c
-against "not in the prior" in light g. The light l of the scene is common to its objects, and that on each
-of them is near it:
+against "not in the prior" in light g. The light l of the scene is common to its objects, and that
+on each of them is near it:
 
     P(l | others) ~ P(l) prod_{j != i} sum_g P(g | l) (1 + sum_c exp s_j(c, g))
     P(c | R) ~ sum_l P(l | others) sum_g P(g | l) exp s_i(c, g),    P(none | R) ~ 1
