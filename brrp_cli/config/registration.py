@@ -115,37 +115,40 @@ class TurnConfig:
 class SearchConfig:
     """Hypotheses about one stored object's pose.
 
-    Initial poses are `matchings` feature matchings and every resting pose turned `turns` times. The
-    best `coarse` of them are refined `coarse_steps` steps with `coarse_points` observed points,
-    which reach the surface from `coarse_distance`; the best `middle` of those, and then the best
-    `fine`, are refined again, each with more points, without those within `same_turn` radians and
-    `same_shift` metres of a better one. A stored object has its stored size. That it is something
-    of the kind, of another size, is a hypothesis of its own, with a size that is refined with the
-    pose: the best `rescaled` placements begin it at `sizes` times the true size,
-    observed points pull from `size_distance` metres, and sizes whose logarithm is within
-    `least_size_change` of 0 or beyond `most_size` are dropped. Its alignment score falls by
-    size_cost + size_spread_cost * ln(size)^2. No other size is tried where the score reaches
-    `settled`, and nothing is refined further where none of the placements reaches `hopeless` or all
-    stay `beaten` behind another model's. Of placements whose surfaces lie within `distinct` metres
-    the best is kept, `kept` in all. An object is not placed at all where another one, with a score
-    of `explained`, explains what is seen, and P(c|R) is less than a share `unlikely` of that one's.
-    rotations : evenly spread, which retrieval tries too.
+    Initial poses are `matchings` feature matchings, every resting pose turned `turns` times, and
+    the model in `rotations` evenly spread turns. The best `begun` of them are brought nearer in
+    `begun_steps` steps with `begun_points` observed points; the best `coarse` of those are refined
+    `coarse_steps` steps with `coarse_points`, which reach the surface from `coarse_distance`; the
+    best `middle` of those, and then the best `fine`, are refined again, each with more points,
+    without those within `same_turn` radians and `same_shift` metres of a better one. A stored
+    object has its stored size. That it is something of the kind, of another size, is a hypothesis
+    of its own, with a size that is refined with the pose: the best `rescaled` placements begin it
+    at `sizes` times the true size, observed points pull from `size_distance` metres, and sizes
+    whose logarithm is within `least_size_change` of 0 or beyond `most_size` are dropped. Its
+    alignment score falls by size_cost + size_spread_cost * ln(size)^2. No other size is tried where
+    the score reaches `settled`, and nothing is refined further where none of the placements reaches
+    `hopeless` or all stay `beaten` behind another model's. Of placements whose surfaces lie within
+    `distinct` metres the best is kept, `kept` in all. An object is not placed at all where another
+    one, with a score of `explained`, explains what is seen, and P(c|R) is less than a share
+    `unlikely` of that one's.
     """
 
     turns: int = 24
-    rotations: int = 0
+    rotations: int = 200
     model_points: int = 300
     least_facing: int = 6
     stray: float = share(0.02)
     box_points: int = 600
     hidden: float = 0.015
     first_share: int = 3
-    first_factor: int = 2
     matchings: int = 4
     matching: RegistrationConfig = field(
         default_factory=lambda: RegistrationConfig(iterations=5_000)
     )
-    coarse: int = 96
+    begun: int = 400
+    begun_points: int = 20
+    begun_steps: int = 3
+    coarse: int = 48
     coarse_distance: float = 0.03
     coarse_points: int = 150
     coarse_steps: int = 6

@@ -126,12 +126,11 @@ class AlignmentConfig:
     search: SearchConfig = field(
         default_factory=lambda: SearchConfig(
             turns=16,
-            rotations=200,
             box_points=200,
             model_points=100,
             seen_points=100,
             first_share=2,
-            coarse=48,
+            coarse=24,
             coarse_points=60,
             coarse_steps=10,
             beaten=0.25,

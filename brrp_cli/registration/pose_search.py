@@ -15,12 +15,14 @@ from scipy.spatial.transform import Rotation
 
 from brrp_cli.config import FeatureConfig, SearchConfig
 from brrp_cli.geometry import as_transforms, transform_points
+from brrp_cli.registration.begin import best_of, brought_nearer, coarse_score, settled
 from brrp_cli.registration.colour_pose import (
     best_and_different,
     textured_agreement,
     turns_about_itself,
 )
 from brrp_cli.registration.initial_poses import feature_matched_poses, resting_initial_poses
+from brrp_cli.registration.leaning_poses import leaning_poses
 from brrp_cli.registration.model import Model
 from brrp_cli.registration.scale_scan import ObservedCloud
 from brrp_cli.registration.sdf_refinement import refine_to_sdf
@@ -62,17 +64,10 @@ def search(
 
     best : alignment score that another model has reached
     """
-    initial = feature_matched_poses(
-        model, observed, features, config.matching, config.matchings, seed
-    )
-    if verifier.plane is not None:
-        initial.extend(resting_initial_poses(model, verifier.points, verifier.plane, config))
-    T = np.stack(initial)
-    T, _ = _best(
-        T, model, verifier, config, config.first_factor * config.coarse, config.first_share
-    )
-    T, _ = _best(T, model, verifier, config, config.coarse)
-    T = _refined(
+    T = _initial_poses(model, observed, verifier, features, config, seed)
+    T, _ = best_of(T, model, verifier, config, config.begun, config.first_share)
+    T = settled(T, model, verifier, config)
+    T = brought_nearer(
         T, model, verifier, config.coarse_points, config.coarse_distance, config.coarse_steps
     )
     least = max(config.hopeless, best - config.beaten)
@@ -80,10 +75,10 @@ def search(
         (config.middle, config.middle_points, config.coarse_distance, config.middle_steps),
         (config.fine, config.fine_points, config.fine_distance, config.fine_steps),
     ):
-        T, reached = _best(T, model, verifier, config, count)
+        T, reached = best_of(T, model, verifier, config, count)
         if reached < least:
             return _judged(T[:1], model, verifier, config)
-        T = _refined(different(T, config), model, verifier, points, distance, steps)
+        T = brought_nearer(different(T, config), model, verifier, points, distance, steps)
     found = _judged(T, model, verifier, config)
     found = by_colour(found, verifier, config)
     if found[0].alignment_score < config.settled:
@@ -91,12 +86,32 @@ def search(
     return _distinct(sorted(found, key=lambda each: -each.alignment_score), config)
 
 
+def _initial_poses(
+    model: Model,
+    observed: ObservedCloud,
+    verifier: Verifier,
+    features: FeatureConfig,
+    config: SearchConfig,
+    seed: int,
+) -> Array:
+    """T_cam_model (B, 4, 4): by matching features, resting, leaning."""
+    matched = feature_matched_poses(
+        model, observed, features, config.matching, config.matchings, seed
+    )
+    points, plane = verifier.points, verifier.plane
+    resting = np.zeros((0, 4, 4))
+    if plane is not None:
+        resting = resting_initial_poses(model, points, plane, config)
+    leaning = leaning_poses(model, resting, points, plane, config)
+    return np.concatenate([np.stack(matched), resting, leaning])
+
+
 def start_from(
     T_cam_model: Array, scale: Array, model: Model, verifier: Verifier, config: SearchConfig
 ) -> list[Hypothesis]:
     """Placements (B, 4, 4) that were found in an earlier frame, and `scale` (B,) of each: as they
     were and refined to this frame, those that differ, best first."""
-    moved = _refined(
+    moved = brought_nearer(
         T_cam_model, model, verifier, config.fine_points, config.fine_distance, config.fine_steps
     )
     log = np.log(scale)
@@ -124,8 +139,8 @@ def by_colour(
         return found
     turns = turns_about_itself(colour.turns)
     T = best.T_cam_model @ as_transforms(turns)
-    score = _coarse_score(T, model, verifier, config)
-    T = _refined(
+    score = coarse_score(T, model, verifier, config)
+    T = brought_nearer(
         T[best_and_different(turns, score, config.middle, colour.apart)],
         model,
         verifier,
@@ -191,34 +206,6 @@ def _distinct(found: list[Hypothesis], config: SearchConfig) -> list[Hypothesis]
     return kept
 
 
-def _best(
-    T_cam_model: Array,
-    model: Model,
-    verifier: Verifier,
-    config: SearchConfig,
-    count: int,
-    share: int = 1,
-) -> tuple[Array, float]:
-    """The `count` best placements by a coarse alignment score, with one of `share` of its points,
-    and the best score."""
-    score = _coarse_score(T_cam_model, model, verifier, config, share)
-    order = np.argsort(-score, kind="stable")[:count]
-    return np.asarray(T_cam_model[order]), float(score[order[0]])
-
-
-def _coarse_score(
-    T_cam_model: Array, model: Model, verifier: Verifier, config: SearchConfig, share: int = 1
-) -> Array:
-    """Of placements (B, 4, 4), with one of `share` points of a coarse alignment score."""
-    return verifier.score(
-        T_cam_model,
-        model,
-        config.alignment_score,
-        model_points=config.model_points // share,
-        seen_points=config.seen_points // share,
-    )
-
-
 def _judged(
     T_cam_model: Array,
     model: Model,
@@ -244,16 +231,6 @@ def _judged(
         for T, size, s in zip(T_cam_model, scales, score - cost, strict=True)
     ]
     return sorted(found, key=lambda each: -each.alignment_score)
-
-
-def _refined(
-    T_cam_model: Array, model: Model, verifier: Verifier, points: int, distance: float, steps: int
-) -> Array:
-    """Each placement (B, 4, 4) with so many observed points brought onto its surface; its size
-    stays. Points further from it than `distance` metres do not pull."""
-    T_model_cam = np.asarray(np.linalg.inv(T_cam_model), dtype=np.float64)
-    seen = verifier.points[:points]
-    return np.asarray(np.linalg.inv(refine_to_sdf(T_model_cam, seen, model, distance, steps)))
 
 
 def _of_other_sizes(

@@ -7,11 +7,21 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
-from table_scene import MESHES, PARAMETERS, TABLE, in_camera, photograph, placed, stored
+from table_scene import (
+    MESHES,
+    PARAMETERS,
+    T_CAM_WORLD,
+    TABLE,
+    in_camera,
+    photograph,
+    placed,
+    stored,
+)
 
 from brrp_cli.config import SearchConfig, WeighConfig
 from brrp_cli.geometry import similarity, transform_points
 from brrp_cli.registration import verification as verifier
+from brrp_cli.registration.begin import coarse_score, settled
 from brrp_cli.registration.model import search_model
 from brrp_cli.registration.pose_search import different, search
 from brrp_cli.registration.scale_scan import observed_cloud
@@ -149,6 +159,39 @@ def test_without_a_plane_feature_matchings_are_enough():
     truth = placed(0.02, -0.03, 1.2) @ over
     best = find("ell", truth, plane=None)[0]
     assert errors(best, truth).max() < 0.002
+
+
+@pytest.mark.parametrize("turned", [(35, 20, 60), (-50, 10, 200), (0, 0, 30)])
+def test_an_object_that_leans_or_lies_on_others_is_found(turned):
+    """It stands in none of its resting poses on the table."""
+    T_world_mesh = similarity(translation=np.array([0.05, -0.04, 0.1]))
+    T_world_mesh[:3, :3] = Rotation.from_euler("xyz", turned, degrees=True).as_matrix()
+    truth = T_CAM_WORLD @ T_world_mesh
+    assert errors(find("ell", truth)[0], truth).max() < 0.003
+
+
+def test_what_is_brought_nearer_is_chosen_by_where_it_comes_to():
+    """A placement that is off by 8 mm and 6 degrees comes nearer; one in the air does not."""
+    truth = placed(0.02, -0.03, 0.9)
+    model = search_model(stored("ell"))
+    frame = photograph({ID: in_camera(MESHES["ell"](), truth)})
+    points = np.random.default_rng(0).permutation(frame.object_points(ID)).astype(np.float64)
+    seen = verifier.Verifier(points, frame, TABLE)
+    T_cam_model = truth @ similarity(translation=model.stored.center)
+    aside = T_cam_model @ similarity(
+        rotation=Rotation.from_euler("z", 6, degrees=True).as_matrix(),
+        translation=np.array([0.008, 0, 0]),
+    )
+    away = similarity(translation=np.array([0, 0, -0.12])) @ T_cam_model
+    chosen = settled(np.stack([away, aside, away]), model, seen, replace(CONFIG, coarse=1))
+
+    def off(T):
+        true = transform_points(T_cam_model, model.surface)
+        return np.linalg.norm(transform_points(T, model.surface) - true, axis=1).mean()
+
+    assert len(chosen) == 1
+    assert off(chosen[0]) < 0.5 * off(aside)
+    assert coarse_score(np.stack([aside, *chosen]), model, seen, CONFIG).argmax() == 1
 
 
 def test_an_object_is_found_whose_one_end_is_hidden():
