@@ -130,6 +130,7 @@ class AlignmentConfig:
             model_points=100,
             seen_points=100,
             first_share=2,
+            begun=100,
             coarse=24,
             coarse_points=60,
             coarse_steps=10,
