@@ -113,7 +113,7 @@ class AlignmentConfig:
     rounds: int = 3
     certain: float = share(0.92)
     margin: float = 12.0
-    first: float = 15.0
+    first: float = 30.0
     most: int = 24
     enough: float = share(0.88)
     more: int = 40
@@ -130,6 +130,7 @@ class AlignmentConfig:
             model_points=100,
             seen_points=100,
             first_share=2,
+            begun=100,
             coarse=24,
             coarse_points=60,
             coarse_steps=10,

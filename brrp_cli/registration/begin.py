@@ -20,9 +20,9 @@ Array = NDArray[np.float64]
 
 def settled(
     T_cam_model: Array, model: ModelGeometry, verifier: Verifier, config: SearchConfig
-) -> Array:
+) -> tuple[Array, float]:
     """The `coarse` best of placements (B, 4, 4) after `begun_steps` steps with `begun_points`
-    observed points."""
+    observed points, best first, and the best score."""
     T = brought_nearer(
         T_cam_model,
         model,
@@ -31,7 +31,7 @@ def settled(
         config.coarse_distance,
         config.begun_steps,
     )
-    return best_of(T, model, verifier, config, config.coarse, config.first_share)[0]
+    return best_of(T, model, verifier, config, config.coarse, config.first_share)
 
 
 def best_of(

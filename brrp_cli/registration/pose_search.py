@@ -66,7 +66,7 @@ def search(
     """
     T = _initial_poses(model, observed, verifier, features, config, seed)
     T, _ = best_of(T, model, verifier, config, config.begun, config.first_share)
-    T = settled(T, model, verifier, config)
+    T, _ = settled(T, model, verifier, config)
     T = brought_nearer(
         T, model, verifier, config.coarse_points, config.coarse_distance, config.coarse_steps
     )

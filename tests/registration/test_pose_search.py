@@ -183,7 +183,7 @@ def test_what_is_brought_nearer_is_chosen_by_where_it_comes_to():
         translation=np.array([0.008, 0, 0]),
     )
     away = similarity(translation=np.array([0, 0, -0.12])) @ T_cam_model
-    chosen = settled(np.stack([away, aside, away]), model, seen, replace(CONFIG, coarse=1))
+    chosen, _ = settled(np.stack([away, aside, away]), model, seen, replace(CONFIG, coarse=1))
 
     def off(T):
         true = transform_points(T_cam_model, model.surface)
