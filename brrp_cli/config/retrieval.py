@@ -149,7 +149,9 @@ class AlignmentConfig:
 class FusionConfig:
     r"""Inverse temperatures of the likenesses and of the alignment score, and the offset of the log
     odds, which falls by `crowding` with the logarithm of the prior's size; at `points` observed
-    points the alignment score counts half: see brrp_cli/retrieval/score_fusion.py.
+    points the alignment score counts half: see brrp_cli/retrieval/score_fusion.py. `alignment` is
+    of how far an object stays behind the best one, `fit` of how far that one is from 1: real depth
+    lowers the scores of all.
 
     Chosen among a few dozen on made scenes, seeds 51300, 51400, 56100 and 56200, and priors of 274
     and 1,196 objects, for the order and the calibration of objects of more than 500 pixels.
@@ -160,9 +162,10 @@ class FusionConfig:
     pairs: float = 9.0
     size: float = 0.15
     alignment: float = between(40.0, 0.0, 1000.0)
-    offset: float = between(12.2, -100.0, 100.0)
+    offset: float = between(11.0, -100.0, 100.0)
     crowding: float = between(0.4, 0.0, 10.0)
     points: float = between(150.0, 1.0, 1e6)
+    fit: float = between(30.0, 0.0, 1000.0)
 
 
 @dataclass(frozen=True)
@@ -189,7 +192,7 @@ class RetrievalConfig:
     similarity: SimilarityConfig = field(default_factory=SimilarityConfig)
     likeness: FusionConfig = field(
         default_factory=lambda: FusionConfig(
-            colour=24.26, pairs=25.27, size=0.44, alignment=0.0, offset=9.88, crowding=1.0
+            colour=24.26, pairs=25.27, size=0.44, alignment=0.0, fit=0.0, offset=9.88, crowding=1.0
         )
     )
     fusion: FusionConfig = field(default_factory=FusionConfig)

@@ -3,11 +3,12 @@
 For object i of the frame, stored object c and light g, with n stored objects:
 
     s_i(c, g) = offset + colour (B_i(c, g) - 1) + pairs (1 - h_i) (D_i(c) - 1) + size Z_i(c)
-                + alignment (A_i(c) - 1) m_i / (m_i + points) - crowding ln n
+                + [alignment (A_i(c) - A_i) + fit (A_i - 1)] m_i / (m_i + points) - crowding ln n
 
 B and D are Bhattacharyya coefficients of colours and of point pairs, in [0, 1], h the hidden share
 of the silhouette, Z <= 0 what speaks against the size and A <= 1 the alignment score of c laid over
-the m points that are seen: many shapes lie well over a few points. s is the log of the odds of c
+the m points that are seen, A_i the best of them: many shapes lie well over a few points, and none
+lies well over the depth of a poor sensor. s is the log of the odds of c
 against "not in the prior" in light g. The light l of the scene is common to its objects, and that
 on each of them is near it:
 
@@ -74,6 +75,8 @@ def believe(
 def _log_odds(item: Similarity, count: int, weights: FusionConfig) -> NDArray[np.float64]:
     shape = weights.pairs * (1 - item.hidden) * (item.pairs - 1) + weights.size * item.size
     sure = item.points / (item.points + weights.points)
-    shape = shape + weights.alignment * sure * (item.alignment - 1)
+    best = np.max(item.alignment)
+    behind = weights.alignment * (item.alignment - best)
+    shape = shape + sure * (behind + weights.fit * (best - 1))
     colour = weights.colour * (item.colour.astype(np.float64) - 1)
     return np.asarray(weights.offset + colour + shape - weights.crowding * np.log(count))

@@ -53,7 +53,7 @@ def test_the_formula_in_plain_numbers():
 def test_alignment_counts_for_each_object():
     # Log odds 8 - 10 * 0.1 - ln 2 and 8 - 10 * 0.6 - ln 2.
     item = replace(seen([[1.0, 1.0]]), alignment=np.array([0.9, 0.4], np.float32))
-    weights = replace(WEIGHTS, alignment=10.0)
+    weights = replace(WEIGHTS, alignment=10.0, fit=10.0)
     found = believe([item], np.zeros(1), np.eye(1), 2, weights)[0]
     odds = np.exp([7.0, 2.0]) / 2
     np.testing.assert_allclose(found, odds / (1 + odds.sum()), rtol=1e-5)
@@ -62,9 +62,18 @@ def test_alignment_counts_for_each_object():
     np.testing.assert_allclose(half, odds / (1 + odds.sum()), rtol=1e-5)
 
 
+def test_what_none_lies_well_over_speaks_less_against_all():
+    """Log odds 8 - 4 * 0.1 - ln 2 and 8 - 4 * 0.1 - 10 * 0.5 - ln 2."""
+    item = replace(seen([[1.0, 1.0]]), alignment=np.array([0.9, 0.4], np.float32))
+    weights = replace(WEIGHTS, alignment=10.0, fit=4.0)
+    found = believe([item], np.zeros(1), np.eye(1), 2, weights)[0]
+    odds = np.exp([7.6, 2.6]) / 2
+    np.testing.assert_allclose(found, odds / (1 + odds.sum()), rtol=1e-5)
+
+
 def test_alignment_with_few_points_counts_less():
     """At `points` points half: log odds 8 - 5 * 0.1 - ln 2 and 8 - 5 * 0.6 - ln 2."""
-    weights = replace(WEIGHTS, alignment=10.0, points=300.0)
+    weights = replace(WEIGHTS, alignment=10.0, fit=10.0, points=300.0)
     item = replace(seen([[1.0, 1.0]], points=300), alignment=np.array([0.9, 0.4], np.float32))
     found = believe([item], np.zeros(1), np.eye(1), 2, weights)[0]
     odds = np.exp([7.5, 5.0]) / 2
