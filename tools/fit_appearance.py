@@ -138,7 +138,7 @@ def without(item: Similarity, row: int) -> Similarity:
 
 
 def fit(views: Sequence[View]) -> FusionConfig:
-    """The weights with the least loss. All of them are positive; what depends on the sensor stays."""
+    """The weights with the least loss, all of them positive; what depends on the sensor stays."""
     from scipy.optimize import minimize
 
     begin = {k: v for k, v in asdict(FusionConfig()).items() if k not in ("usual", "wave")}

@@ -3,8 +3,8 @@
 For object i of the frame, stored object c and light g, with n stored objects:
 
     s_i(c, g) = offset + colour (B_i(c, g) - 1) + pairs (1 - h_i) (D_i(c) - 1) + size Z_i(c)
-                + [alignment (A_i(c) - A_i) + fit_i (A_i - usual)] m_i / (m_i + points) - crowding ln n
-      fit_i = fit min(1, wave / w)
+                + [alignment (A_i(c) - A_i) + fit_i (A_i - usual)] m_i / (m_i + points)
+                - crowding ln n,    fit_i = fit min(1, wave / w)
 
 B and D are Bhattacharyya coefficients of colours and of point pairs, in [0, 1], h the hidden share
 of the silhouette, Z <= 0 what speaks against the size and A <= 1 the alignment score of c laid over
