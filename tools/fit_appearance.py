@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Sequence
-from dataclasses import astuple, dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 import click
@@ -138,16 +138,22 @@ def without(item: Similarity, row: int) -> Similarity:
 
 
 def fit(views: Sequence[View]) -> FusionConfig:
-    """The weights with the least loss. All of them are positive."""
+    """The weights with the least loss, all of them positive; what depends on the sensor stays."""
     from scipy.optimize import minimize
 
-    found = minimize(
-        lambda x: loss(views, FusionConfig(*np.exp(x))),
-        np.log(astuple(FusionConfig())),
+    begin = {k: v for k, v in asdict(FusionConfig()).items() if k not in ("usual", "wave")}
+
+    def weights(x: NDArray[np.float64]) -> FusionConfig:
+        found = zip(begin, np.exp(x), strict=True)
+        return FusionConfig(**{name: round(float(value), 3) for name, value in found})
+
+    best = minimize(
+        lambda x: loss(views, weights(x)),
+        np.log(list(begin.values())),
         method="Nelder-Mead",
         options={"xatol": 1e-2, "fatol": 1e-4, "maxfev": 200},
     )
-    return FusionConfig(*(round(float(value), 2) for value in np.exp(found.x)))
+    return weights(best.x)
 
 
 def answers(

@@ -149,10 +149,14 @@ class AlignmentConfig:
 class FusionConfig:
     r"""Inverse temperatures of the likenesses and of the alignment score, and the offset of the log
     odds, which falls by `crowding` with the logarithm of the prior's size; at `points` observed
-    points the alignment score counts half: see brrp_cli/retrieval/score_fusion.py.
+    points the alignment score counts half: see brrp_cli/retrieval/score_fusion.py. `alignment` is
+    of how far an object stays behind the best one, `fit` of how far that one is above or below the
+    `usual` score of a right one; where depth has waves of more than `wave` metres it counts less,
+    since they lower the scores of all.
 
     Chosen among a few dozen on made scenes, seeds 51300, 51400, 56100 and 56200, and priors of 274
-    and 1,196 objects, for the order and the calibration of objects of more than 500 pixels.
+    and 1,196 objects, for the order and the calibration of objects of more than 500 pixels; `usual`
+    and `wave` also on scenes of other sensors, those that the likelihood is fitted to.
     docs/retrieval.md has the commands.
     """
 
@@ -160,9 +164,12 @@ class FusionConfig:
     pairs: float = 9.0
     size: float = 0.15
     alignment: float = between(40.0, 0.0, 1000.0)
-    offset: float = between(12.2, -100.0, 100.0)
+    offset: float = between(8.4, -100.0, 100.0)
     crowding: float = between(0.4, 0.0, 10.0)
     points: float = between(150.0, 1.0, 1e6)
+    fit: float = between(40.0, 0.0, 1000.0)
+    usual: float = share(0.9)
+    wave: float = 0.0008
 
 
 @dataclass(frozen=True)
@@ -189,7 +196,7 @@ class RetrievalConfig:
     similarity: SimilarityConfig = field(default_factory=SimilarityConfig)
     likeness: FusionConfig = field(
         default_factory=lambda: FusionConfig(
-            colour=24.26, pairs=25.27, size=0.44, alignment=0.0, offset=9.88, crowding=1.0
+            colour=24.26, pairs=25.27, size=0.44, alignment=0.0, fit=0.0, offset=9.88, crowding=1.0
         )
     )
     fusion: FusionConfig = field(default_factory=FusionConfig)

@@ -145,7 +145,7 @@ class AppearanceRetriever:
         last = np.sort(last[np.isfinite(promise[last])])
         found = seen.last_scores(self._named(look.rows[last]), own.finest)
         alignment[last] = np.maximum(found, own.lowest)
-        return replace(look, alignment=alignment)
+        return replace(look, alignment=alignment, wave=wave)
 
     def _named(self, rows: NDArray[np.int64]) -> list[str]:
         return [self._names[row] for row in rows]

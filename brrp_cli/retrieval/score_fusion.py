@@ -3,11 +3,13 @@
 For object i of the frame, stored object c and light g, with n stored objects:
 
     s_i(c, g) = offset + colour (B_i(c, g) - 1) + pairs (1 - h_i) (D_i(c) - 1) + size Z_i(c)
-                + alignment (A_i(c) - 1) m_i / (m_i + points) - crowding ln n
+                + [alignment (A_i(c) - A_i) + fit_i (A_i - usual)] m_i / (m_i + points)
+                - crowding ln n,    fit_i = fit min(1, wave / w)
 
 B and D are Bhattacharyya coefficients of colours and of point pairs, in [0, 1], h the hidden share
 of the silhouette, Z <= 0 what speaks against the size and A <= 1 the alignment score of c laid over
-the m points that are seen: many shapes lie well over a few points. s is the log of the odds of c
+the m points that are seen, A_i the best of them: many shapes lie well over a few points, and none
+lies well over depth with waves of deviation w. s is the log of the odds of c
 against "not in the prior" in light g. The light l of the scene is common to its objects, and that
 on each of them is near it:
 
@@ -32,7 +34,8 @@ class Similarity:
 
     rows : (m,) which of the prior's n objects; colour : (g, m), one row for each light;
     pairs : (m,); size : (m,), 0 or less; alignment : (m,), or 1 for all;
-    hidden : share of the silhouette; points : observed, that objects are aligned with
+    hidden : share of the silhouette; points : observed, that objects are aligned with; wave :
+    metres, by which their depth errs over patches (observation/sensor_noise.py)
     """
 
     rows: NDArray[np.int64]
@@ -42,6 +45,7 @@ class Similarity:
     hidden: float
     points: int
     alignment: NDArray[np.float32] | float = 1.0
+    wave: float = 0.0
 
 
 def believe(
@@ -74,6 +78,9 @@ def believe(
 def _log_odds(item: Similarity, count: int, weights: FusionConfig) -> NDArray[np.float64]:
     shape = weights.pairs * (1 - item.hidden) * (item.pairs - 1) + weights.size * item.size
     sure = item.points / (item.points + weights.points)
-    shape = shape + weights.alignment * sure * (item.alignment - 1)
+    best = np.max(item.alignment)
+    behind = weights.alignment * (item.alignment - best)
+    clear = min(1.0, weights.wave / item.wave) if item.wave else 1.0
+    shape = shape + sure * (behind + weights.fit * clear * (best - weights.usual))
     colour = weights.colour * (item.colour.astype(np.float64) - 1)
     return np.asarray(weights.offset + colour + shape - weights.crowding * np.log(count))

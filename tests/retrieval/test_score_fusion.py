@@ -8,7 +8,9 @@ from brrp_cli.retrieval.base import unknown
 from brrp_cli.retrieval.illuminants import lights, local_lights, log_prior
 from brrp_cli.retrieval.score_fusion import Similarity, believe
 
-WEIGHTS = FusionConfig(colour=20.0, pairs=20.0, size=0.5, offset=8.0, crowding=1.0)
+WEIGHTS = FusionConfig(
+    colour=20.0, pairs=20.0, size=0.5, fit=0.0, usual=1.0, offset=8.0, crowding=1.0
+)
 FLAT, SAME = np.zeros(2), np.eye(2)
 
 
@@ -53,7 +55,7 @@ def test_the_formula_in_plain_numbers():
 def test_alignment_counts_for_each_object():
     # Log odds 8 - 10 * 0.1 - ln 2 and 8 - 10 * 0.6 - ln 2.
     item = replace(seen([[1.0, 1.0]]), alignment=np.array([0.9, 0.4], np.float32))
-    weights = replace(WEIGHTS, alignment=10.0)
+    weights = replace(WEIGHTS, alignment=10.0, fit=10.0)
     found = believe([item], np.zeros(1), np.eye(1), 2, weights)[0]
     odds = np.exp([7.0, 2.0]) / 2
     np.testing.assert_allclose(found, odds / (1 + odds.sum()), rtol=1e-5)
@@ -62,9 +64,30 @@ def test_alignment_counts_for_each_object():
     np.testing.assert_allclose(half, odds / (1 + odds.sum()), rtol=1e-5)
 
 
+def test_what_none_lies_well_over_speaks_less_against_all():
+    """Log odds 8 - 4 * 0.1 - ln 2 and 8 - 4 * 0.1 - 10 * 0.5 - ln 2."""
+    item = replace(seen([[1.0, 1.0]]), alignment=np.array([0.9, 0.4], np.float32))
+    weights = replace(WEIGHTS, alignment=10.0, fit=4.0)
+    found = believe([item], np.zeros(1), np.eye(1), 2, weights)[0]
+    odds = np.exp([7.6, 2.6]) / 2
+    np.testing.assert_allclose(found, odds / (1 + odds.sum()), rtol=1e-5)
+
+
+def test_what_lies_badly_over_wavy_depth_speaks_less_against_all():
+    """Waves four times as high as `wave`: log odds 8 - 4 / 4 * 0.1 - ln 2, and 5 less."""
+    item = replace(seen([[1.0, 1.0]]), alignment=np.array([0.9, 0.4], np.float32), wave=0.002)
+    weights = replace(WEIGHTS, alignment=10.0, fit=4.0, wave=0.0005)
+    found = believe([item], np.zeros(1), np.eye(1), 2, weights)[0]
+    odds = np.exp([7.9, 2.9]) / 2
+    np.testing.assert_allclose(found, odds / (1 + odds.sum()), rtol=1e-5)
+    calm = believe([replace(item, wave=0.0004)], np.zeros(1), np.eye(1), 2, weights)[0]
+    odds = np.exp([7.6, 2.6]) / 2
+    np.testing.assert_allclose(calm, odds / (1 + odds.sum()), rtol=1e-5)
+
+
 def test_alignment_with_few_points_counts_less():
     """At `points` points half: log odds 8 - 5 * 0.1 - ln 2 and 8 - 5 * 0.6 - ln 2."""
-    weights = replace(WEIGHTS, alignment=10.0, points=300.0)
+    weights = replace(WEIGHTS, alignment=10.0, fit=10.0, points=300.0)
     item = replace(seen([[1.0, 1.0]], points=300), alignment=np.array([0.9, 0.4], np.float32))
     found = believe([item], np.zeros(1), np.eye(1), 2, weights)[0]
     odds = np.exp([7.5, 5.0]) / 2
