@@ -115,8 +115,9 @@ class TurnConfig:
 class SearchConfig:
     """Hypotheses about one stored object's pose.
 
-    Initial poses are `matchings` feature matchings, every resting pose turned `turns` times, and
-    the model in `rotations` evenly spread turns. The best `begun` of them are brought nearer in
+    Initial poses are `matchings` feature matchings, every resting pose turned `turns` times and
+    raised to the top of what is seen, and the model in `rotations` evenly spread turns and along
+    the principal axes of what is seen. The best `begun` of them are brought nearer in
     `begun_steps` steps with `begun_points` observed points; the best `coarse` of those are refined
     `coarse_steps` steps with `coarse_points`, which reach the surface from `coarse_distance`; the
     best `middle` of those, and then the best `fine`, are refined again, each with more points,

@@ -91,7 +91,7 @@ class AlignmentConfig:
         it, `likeness` in place of `fusion`, and real depth lowers the scores of the right one too
     tried : objects that are laid over what is seen, the most probable by their likenesses, so many
         of those with colours and of those without; margin : nats by which theirs may be less than
-        the best one's; first : weight, in nats, of the score that they reach before any is refined
+        the best one's; first : weight, in nats, of the score that they reach in the first few steps
     most : objects whose placements are refined, the best by likenesses and first score; where none
         of them reaches the score `enough`, so are the next `more`
     rounds : of so many objects, the most probable first; one that reaches the score `certain` ends
@@ -169,7 +169,7 @@ class FusionConfig:
     points: float = between(150.0, 1.0, 1e6)
     fit: float = between(40.0, 0.0, 1000.0)
     usual: float = share(0.9)
-    wave: float = 0.0008
+    wave: float = between(0.0008, 1e-6, 1.0)
 
 
 @dataclass(frozen=True)

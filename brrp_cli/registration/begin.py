@@ -18,7 +18,7 @@ from brrp_cli.registration.verification import Verifier
 Array = NDArray[np.float64]
 
 
-def settled(
+def best_brought_nearer(
     T_cam_model: Array, model: ModelGeometry, verifier: Verifier, config: SearchConfig
 ) -> tuple[Array, float]:
     """The `coarse` best of placements (B, 4, 4) after `begun_steps` steps with `begun_points`

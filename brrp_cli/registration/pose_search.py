@@ -15,7 +15,7 @@ from scipy.spatial.transform import Rotation
 
 from brrp_cli.config import FeatureConfig, SearchConfig
 from brrp_cli.geometry import as_transforms, transform_points
-from brrp_cli.registration.begin import best_of, brought_nearer, coarse_score, settled
+from brrp_cli.registration.begin import best_brought_nearer, best_of, brought_nearer, coarse_score
 from brrp_cli.registration.colour_pose import (
     best_and_different,
     textured_agreement,
@@ -66,7 +66,7 @@ def search(
     """
     T = _initial_poses(model, observed, verifier, features, config, seed)
     T, _ = best_of(T, model, verifier, config, config.begun, config.first_share)
-    T, _ = settled(T, model, verifier, config)
+    T, _ = best_brought_nearer(T, model, verifier, config)
     T = brought_nearer(
         T, model, verifier, config.coarse_points, config.coarse_distance, config.coarse_steps
     )

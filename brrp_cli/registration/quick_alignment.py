@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brrp_cli.config import SearchConfig
-from brrp_cli.registration.begin import best_of, brought_nearer, settled
+from brrp_cli.registration.begin import best_brought_nearer, best_of, brought_nearer
 from brrp_cli.registration.initial_poses import resting_initial_poses
 from brrp_cli.registration.leaning_poses import leaning_poses
 from brrp_cli.registration.model import ModelGeometry
@@ -24,18 +24,9 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class FirstPlacements:
-    """T_cam_model (B, 4, 4), the most promising placements of a model, best first, and the score of
-    the best, 1 at best."""
-
-    T_cam_model: Array
-    score: float
-
-
-@dataclass(frozen=True)
 class Aligned:
-    """T_cam_model (B, 4, 4), refined placements of a model, best first, and the score of the best,
-    1 at best."""
+    """T_cam_model (B, 4, 4), placements of a model, best first, and the score of the best, 1 at
+    best."""
 
     T_cam_model: Array
     score: float
@@ -43,7 +34,7 @@ class Aligned:
 
 def aligned(
     models: Sequence[ModelGeometry],
-    placements: Sequence[FirstPlacements],
+    placements: Sequence[Aligned],
     verifier: Verifier,
     config: SearchConfig,
 ) -> list[Aligned]:
@@ -83,9 +74,7 @@ def finely(
     return Aligned(np.asarray(T[order]), float(score[order[0]]))
 
 
-def first_placements(
-    model: ModelGeometry, verifier: Verifier, config: SearchConfig
-) -> FirstPlacements:
+def first_placements(model: ModelGeometry, verifier: Verifier, config: SearchConfig) -> Aligned:
     """The `begun` best of all ways to lay a model over what is seen, brought nearer, on a plane
     that `verifier` must have: resting, raised, leaning.
 
@@ -97,11 +86,11 @@ def first_placements(
     leaning = leaning_poses(model, resting, verifier.points, verifier.plane, config)
     T = np.concatenate([resting, leaning])
     T, _ = best_of(T, model, verifier, config, config.begun, config.first_share)
-    return FirstPlacements(*settled(T, model, verifier, config))
+    return Aligned(*best_brought_nearer(T, model, verifier, config))
 
 
 def _coarse(
-    model: ModelGeometry, first: FirstPlacements, verifier: Verifier, config: SearchConfig
+    model: ModelGeometry, first: Aligned, verifier: Verifier, config: SearchConfig
 ) -> Aligned:
     """The first placements after a coarse refinement."""
     T = brought_nearer(

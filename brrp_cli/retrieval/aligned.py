@@ -21,7 +21,6 @@ from brrp_cli.prior.store import Prior
 from brrp_cli.registration.model import BareModel
 from brrp_cli.registration.quick_alignment import (
     Aligned,
-    FirstPlacements,
     aligned,
     finely,
     first_placements,
@@ -95,11 +94,11 @@ class SeenPart:
         self._aligner = aligner
         self._verifier = verifier
         self._search = search
-        self._first: dict[str, FirstPlacements] = {}
+        self._first: dict[str, Aligned] = {}
         self._placed: dict[str, Aligned] = {}
 
     def first_scores(self, names: Sequence[str]) -> NDArray[np.float64]:
-        """Alignment scores (m,) of the objects of these names before any is refined. Errors:
+        """Alignment scores (m,) of the objects of these names after the first few steps. Errors:
         PriorError."""
         for name, model in zip(names, self._aligner.models(names), strict=True):
             self._first[name] = first_placements(model, self._verifier, self._search)

@@ -9,9 +9,9 @@ For object i of the frame, stored object c and light g, with n stored objects:
 B and D are Bhattacharyya coefficients of colours and of point pairs, in [0, 1], h the hidden share
 of the silhouette, Z <= 0 what speaks against the size and A <= 1 the alignment score of c laid over
 the m points that are seen, A_i the best of them: many shapes lie well over a few points, and none
-lies well over depth with waves of deviation w. s is the log of the odds of c
-against "not in the prior" in light g. The light l of the scene is common to its objects, and that
-on each of them is near it:
+lies well over depth with waves of deviation w. s is the log of the odds of c against "not in the
+prior" in light g. The light l of the scene is common to its objects, and that on each of them is
+near it:
 
     P(l | others) ~ P(l) prod_{j != i} sum_g P(g | l) (1 + sum_c exp s_j(c, g))
     P(c | R) ~ sum_l P(l | others) sum_g P(g | l) exp s_i(c, g),    P(none | R) ~ 1
@@ -80,7 +80,7 @@ def _log_odds(item: Similarity, count: int, weights: FusionConfig) -> NDArray[np
     sure = item.points / (item.points + weights.points)
     best = np.max(item.alignment)
     behind = weights.alignment * (item.alignment - best)
-    clear = min(1.0, weights.wave / item.wave) if item.wave else 1.0
+    clear = weights.wave / max(weights.wave, item.wave)
     shape = shape + sure * (behind + weights.fit * clear * (best - weights.usual))
     colour = weights.colour * (item.colour.astype(np.float64) - 1)
     return np.asarray(weights.offset + colour + shape - weights.crowding * np.log(count))
