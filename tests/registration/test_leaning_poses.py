@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
-from table_scene import T_CAM_WORLD, TABLE, box, in_camera, photograph, stored
+from table_scene import T_CAM_WORLD, TABLE, box, stored, verifier_of
 
 from brrp_cli.config import SearchConfig
 from brrp_cli.geometry import similarity, transform_points
@@ -17,22 +17,13 @@ from brrp_cli.registration.leaning_poses import (
     turned_poses,
 )
 from brrp_cli.registration.model import search_model
-from brrp_cli.registration.verification import Verifier
 
 CONFIG = SearchConfig()
-THING = 5
 
 
 @pytest.fixture(scope="module")
 def models():
     return [search_model(stored(name)) for name in ("box", "ell")]
-
-
-def seen(mesh, T_cam_mesh):
-    """What a frame says of a mesh there."""
-    frame = photograph({THING: in_camera(mesh, T_cam_mesh)})
-    points = frame.object_points(THING).astype(np.float64)
-    return Verifier(np.random.default_rng(0).permutation(points), frame, TABLE)
 
 
 def test_principal_axes_give_the_pose_of_a_whole_surface(models):
@@ -48,7 +39,7 @@ def test_principal_axes_give_the_pose_of_a_whole_surface(models):
 
 def test_raised_poses_reach_the_top_of_what_is_seen(models):
     where = T_CAM_WORLD @ similarity(translation=np.array([0.05, -0.04, 0.09]))
-    verifier = seen(box(), where)
+    verifier = verifier_of(box(), where)
     resting = resting_initial_poses(models[0], verifier.points, TABLE, CONFIG)
     raised = raised_poses(resting, models[0], verifier.points, TABLE, CONFIG)
     assert len(raised)
@@ -72,7 +63,7 @@ def test_rotations_are_spread_over_all_of_them():
 def test_a_turned_model_lies_over_what_is_seen(models):
     """The side that faces the camera, and no other, has the box of the seen points."""
     where = T_CAM_WORLD @ similarity(translation=np.array([0.05, -0.04, 0.2]))
-    verifier = seen(box(), where)
+    verifier = verifier_of(box(), where)
     poses = turned_poses(spread_rotations(CONFIG.rotations), models[0], verifier.points, CONFIG)
     assert len(poses) == CONFIG.rotations
     turn = np.einsum("bij,ij->b", poses[:, :3, :3], where[:3, :3])

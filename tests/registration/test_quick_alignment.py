@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
-from table_scene import T_CAM_WORLD, TABLE, box, ell, in_camera, photograph, placed, stored
+from table_scene import T_CAM_WORLD, box, ell, placed, stored, verifier_of
 
 from brrp_cli.config.retrieval import AlignmentConfig
 from brrp_cli.geometry import similarity, transform_points
@@ -15,22 +15,13 @@ from brrp_cli.registration.quick_alignment import (
     finely,
     first_placements,
 )
-from brrp_cli.registration.verification import Verifier
 
 CONFIG, FINEST = AlignmentConfig().search, AlignmentConfig().finest
-THING = 5
 
 
 @pytest.fixture(scope="module")
 def models():
     return [search_model(stored(name)) for name in ("box", "ell")]
-
-
-def seen(mesh, T_cam_mesh):
-    """What a frame says of a mesh there."""
-    frame = photograph({THING: in_camera(mesh, T_cam_mesh)})
-    points = frame.object_points(THING).astype(np.float64)
-    return Verifier(np.random.default_rng(0).permutation(points), frame, TABLE)
 
 
 def scores(models, verifier):
@@ -41,14 +32,14 @@ def scores(models, verifier):
 def test_the_true_model_scores_highest(models):
     where = placed(0.05, -0.04, 0.3)
     for true, mesh in enumerate((box(), ell())):
-        score = scores(models, seen(mesh, where))
+        score = scores(models, verifier_of(mesh, where))
         assert score[true] > 0.9 and score[1 - true] < score[true] - 0.1
 
 
 def test_the_last_stage_brings_the_true_model_nearer(models):
     """Its placement was right to some millimetres; its score then comes from nearer still."""
     where = placed(0.05, -0.04, 0.3)
-    verifier = seen(box(), where)
+    verifier = verifier_of(box(), where)
     first = [first_placements(model, verifier, CONFIG) for model in models]
     before = aligned(models, first, verifier, CONFIG)
     after = finely(before[0], models[0], verifier, FINEST)
@@ -72,5 +63,5 @@ def test_an_object_that_leans_or_lies_on_others_is_aligned_too(models):
     raised = similarity(translation=np.array([0.05, -0.04, 0.09]))
     for T_world_mesh in (leaning, raised):
         where = T_CAM_WORLD @ T_world_mesh
-        score = scores(models, seen(box(), where))
+        score = scores(models, verifier_of(box(), where))
         assert score[0] > 0.85 and score[1] < score[0] - 0.2

@@ -23,6 +23,7 @@ from brrp_cli.prior.build.make_object import make_object
 from brrp_cli.prior.objects import PriorObject
 from brrp_cli.prior.parameters import AppearanceConfig, BuildParameters
 from brrp_cli.raycast import look
+from brrp_cli.registration.verification import Verifier
 from brrp_cli.shapes import solids
 
 K = np.array([[300.0, 0, 160], [0, 300.0, 120], [0, 0, 1]])
@@ -108,3 +109,10 @@ def photograph(things: Mapping[int, trimesh.Trimesh], *, table: bool = True) -> 
         K=K,
         T_world_cam=T_WORLD_CAM,
     )
+
+
+def verifier_of(mesh: trimesh.Trimesh, T_cam_mesh: np.ndarray) -> Verifier:
+    """What a frame says of a mesh that stands or floats there."""
+    frame = photograph({1: in_camera(mesh, T_cam_mesh)})
+    points = frame.object_points(1).astype(np.float64)
+    return Verifier(np.random.default_rng(0).permutation(points), frame, TABLE)
