@@ -13,6 +13,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from brrp_cli.config.registration import TrialConfig
 from brrp_cli.frames.frame import Frame
 from brrp_cli.methods.base import Setup, Stream
 from brrp_cli.methods.configuration import MethodConfig
@@ -40,6 +41,7 @@ def reconstruct(
     workers: int | None = None,
     only: Collection[int] | None = None,
     stream: Stream | None = None,
+    trial: TrialConfig | None = None,
 ) -> Reconstruction:
     """Reconstruct every object of a segmented frame.
 
@@ -52,6 +54,7 @@ def reconstruct(
     only : ids of the objects that are asked for, by default all; the others are still seen as
         objects
     stream : what earlier frames of the same stream showed (sessions pass it)
+    trial : only looks which stored objects lie there, and gives no shapes (mending of masks does)
 
     An object that cannot be reconstructed gets a status; the others still are. The frame is never
     changed. The same seed gives the same result, whatever the number of workers.
@@ -72,6 +75,7 @@ def reconstruct(
         workers=workers,
         only=None if only is None else frozenset(only),
         stream=stream,
+        trial=trial,
     )
     chosen.check(setup)
     start = time.perf_counter()

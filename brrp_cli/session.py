@@ -16,19 +16,23 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
+from numpy.typing import NDArray
 
 from brrp_cli.api import reconstruct
+from brrp_cli.config.registration import TrialConfig
 from brrp_cli.config.segmentation import SegmentConfig
 from brrp_cli.config.tracking import SharpenConfig, TrackConfig
 from brrp_cli.errors import FrameError
 from brrp_cli.frames.frame import Frame
 from brrp_cli.geometry import normalise
-from brrp_cli.mending import Again, mend
+from brrp_cli.mending.again import Again
+from brrp_cli.mending.mend import mend
 from brrp_cli.methods.base import EarlierView, Memory, Stream
 from brrp_cli.methods.configuration import MethodConfig
 from brrp_cli.methods.registry import DEFAULT, reconstructing_method
 from brrp_cli.prior.store import Prior, open_prior
 from brrp_cli.reconstruction import ObjectReconstruction, Reconstruction
+from brrp_cli.retrieval.base import one_image
 from brrp_cli.tracking import (
     Followed,
     at_rest,
@@ -109,18 +113,25 @@ class Reconstructor:
 
         Errors: BrrpError; FrameError if nothing stands on the table.
         """
+        with one_image(self._retriever):
+            return self._reconstructed(frame)
+
+    def _reconstructed(self, frame: Frame) -> Reconstruction:
         start = time.perf_counter()
-        masked = frame if frame.object_ids else self._with_masks(frame)
+        masked, aside = (frame, None) if frame.object_ids else self._with_masks(frame)
         seconds = time.perf_counter() - start
         made = masked is not frame
         if self._track is not None:
-            result = self._tracked(masked, mends=made)
+            result = self._tracked(masked, aside, mends=made)
         else:
-            result = self._mended(self._all(masked)) if made else self._all(masked)
+            result = self._all(masked)
+            result = self._mended(result, self._all, aside) if made else result
         result.seconds["masks"] = seconds
         return replace(result, segmentation=asdict(self._segmentation)) if made else result
 
-    def _tracked(self, frame: Frame, *, mends: bool) -> Reconstruction:
+    def _tracked(
+        self, frame: Frame, aside: NDArray[np.int64] | None, *, mends: bool
+    ) -> Reconstruction:
         """All objects under the ids of their tracks; those that have not moved as they were."""
         assert self._track is not None
         start = time.perf_counter()
@@ -147,7 +158,7 @@ class Reconstructor:
         objects = sorted([*result.objects, *kept], key=lambda item: item.object_id)
         result = replace(result, objects=objects)
         if mends:
-            result = self._mended(result, followed.next_id, infer)
+            result = self._mended(result, infer, aside, todo, followed.next_id)
         result.seconds["tracking"] = seconds
         # Mending may have made anew what was kept.
         was = {item.object_id: item for item in kept}
@@ -161,9 +172,16 @@ class Reconstructor:
         return result
 
     def _mended(
-        self, result: Reconstruction, first_free: int = 1, again: Again | None = None
+        self,
+        result: Reconstruction,
+        again: Again,
+        aside: NDArray[np.int64] | None,
+        asked: Collection[int] | None = None,
+        first_free: int = 1,
     ) -> Reconstruction:
-        return mend(result, self._prior, again or self._all, self._segmentation.mend, first_free)
+        return mend(
+            result, self._prior, again, self._segmentation, aside, asked, first_free=first_free
+        )
 
     def _stream(self, frame: Frame, ids: Collection[int]) -> Stream | None:
         """What earlier frames showed of those objects of this one that are at rest since; all else
@@ -212,7 +230,9 @@ class Reconstructor:
         self,
         frame: Frame,
         only: Collection[int] | None = None,
+        *,
         stream: Stream | None = None,
+        trial: TrialConfig | None = None,
     ) -> Reconstruction:
         return reconstruct(
             frame,
@@ -226,6 +246,7 @@ class Reconstructor:
             workers=self._workers,
             only=only,
             stream=stream,
+            trial=trial,
         )
 
     def stream(self, frames: Iterable[Frame]) -> Iterator[Reconstruction | FrameError]:
@@ -237,9 +258,11 @@ class Reconstructor:
             except FrameError as error:
                 yield error
 
-    def _with_masks(self, frame: Frame) -> Frame:
-        from brrp_cli.segmentation.segment import segment
+    def _with_masks(self, frame: Frame) -> tuple[Frame, NDArray[np.int64] | None]:
+        """The frame with masks, and masks (H, W) that were left out."""
+        from brrp_cli.segmentation.segment import segment_and_aside
 
         if self._segmenter is not None and self._prompt is not None:
-            return replace(frame, segmap=self._segmenter(frame, self._prompt, self._seed))
-        return replace(frame, segmap=segment(frame, self._seed, self._segmentation))
+            return replace(frame, segmap=self._segmenter(frame, self._prompt, self._seed)), None
+        segmap, aside = segment_and_aside(frame, self._seed, self._segmentation)
+        return replace(frame, segmap=segmap), aside

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 from shlex import quote
 from typing import TYPE_CHECKING
@@ -10,9 +11,20 @@ from brrp_cli.commands.frame import refuse_existing
 from brrp_cli.progress import note
 
 if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
     from brrp_cli.commands.source_options import SourceOptions
     from brrp_cli.config.segmentation import SegmentConfig
     from brrp_cli.frames.frame import Frame
+
+
+@dataclass(frozen=True)
+class MadeMasks:
+    """How the masks of a frame were made, and which (H, W) were left out; 0 = none."""
+
+    config: SegmentConfig
+    aside: NDArray[np.int64] | None
 
 
 def make_masks(
@@ -23,16 +35,17 @@ def make_masks(
     config: SegmentConfig,
     *,
     overwrite: bool,
-) -> Frame:
+) -> tuple[Frame, MadeMasks]:
     """The frame with masks made on the way; a picture of them is written beside the output."""
     from brrp_cli.frames.build import require_objects
     from brrp_cli.segmentation.mask_picture import write_picture
 
     if source.masks is not None:
-        return require_objects(frame)
+        return require_objects(frame), MadeMasks(config, None)
     picture = output.with_name(output.name + ".masks.png")
     refuse_existing([picture], overwrite)
-    frame = require_objects(source.make_masks(frame, seed, config))
+    frame, aside = source.make_masks(frame, seed, config)
+    require_objects(frame)
     write_picture(frame, picture)
     how = f"the prompt {source.prompt!r}" if source.prompt else "what stands on the table"
     note(f"Masks: made on the way from {how}, {len(frame.object_ids)} objects: {picture}")
@@ -40,7 +53,7 @@ def make_masks(
         f"  to correct them: brrp segment {quote(str(output / 'frame.npz'))} --merge 1,2 --split 3"
         " --drop 4 -o NEW.npz"
     )
-    return frame
+    return frame, MadeMasks(config, aside)
 
 
 def tell_mended(before: Frame, after: Frame, output: Path) -> None:

@@ -18,9 +18,9 @@ from brrp_cli.errors import BrrpError, FrameError, OutputError, ResultError, une
 from brrp_cli.progress import hushed, note, only_bar, say
 
 if TYPE_CHECKING:
+    from brrp_cli.commands.made_masks import MadeMasks
     from brrp_cli.commands.object_table import Told
     from brrp_cli.commands.source_options import SourceOptions
-    from brrp_cli.config.segmentation import SegmentConfig
     from brrp_cli.frames.frame import Frame
 
 SUMMARY = "frames.json"
@@ -58,8 +58,8 @@ class Work:
     """
 
     source: SourceOptions
-    with_masks: Callable[[Frame, Path], tuple[Frame, SegmentConfig | None]]
-    one: Callable[[Frame, SegmentConfig | None, Path], list[Told]]
+    with_masks: Callable[[Frame, Path], tuple[Frame, MadeMasks | None]]
+    one: Callable[[Frame, MadeMasks | None, Path], list[Told]]
     settings: dict[str, Any]
     overwrite: bool
 

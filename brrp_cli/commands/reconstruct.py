@@ -13,7 +13,7 @@ import click
 from brrp_cli.commands.export import CONFIDENCE, check_libraries, export
 from brrp_cli.commands.grasp import GRIPPER_HELP, JSON, grasp
 from brrp_cli.commands.json_option import json_option, report_of
-from brrp_cli.commands.made_masks import make_masks, tell_mended
+from brrp_cli.commands.made_masks import MadeMasks, make_masks, tell_mended
 from brrp_cli.commands.many_frames import Work, check_many, frame_slice, run_many
 from brrp_cli.commands.method_options import (
     CONFIG_HELP,
@@ -40,11 +40,14 @@ from brrp_cli.retrieval.choose import RETRIEVERS, choose_retriever
 from brrp_cli.retrieval.clip.model_files import CLIP_DIR_VARIABLE
 
 if TYPE_CHECKING:
-    from brrp_cli.config.segmentation import SegmentConfig
+    from collections.abc import Collection
+
+    from brrp_cli.config.registration import TrialConfig
     from brrp_cli.frames.frame import Frame
     from brrp_cli.grasping.gripper import Gripper
     from brrp_cli.methods.base import Method
     from brrp_cli.prior.store import Prior
+    from brrp_cli.reconstruction import Reconstruction
     from brrp_cli.retrieval.base import Retriever
 
 SOME_FAILED = 3
@@ -193,11 +196,12 @@ def command(
 
     from brrp_cli.api import open_result, reconstruct
     from brrp_cli.config.segmentation import SegmentConfig
-    from brrp_cli.mending import mend
+    from brrp_cli.mending.mend import mend
     from brrp_cli.methods.config_file import read_config
     from brrp_cli.methods.configuration import as_record
     from brrp_cli.results.bop import bop_csv
     from brrp_cli.results.write import check_output, write_results
+    from brrp_cli.retrieval.base import one_image
 
     check_collision(collision, confidence)
     hand = check_gripper(grasp_it, gripper)
@@ -215,12 +219,11 @@ def command(
         check_output(output, seen, coordinates, overwrite=overwrite)
     mask_config = SegmentConfig() if read is None else read.segmentation()
 
-    def with_masks(frame: Frame, folder: Path) -> tuple[Frame, SegmentConfig | None]:
+    def with_masks(frame: Frame, folder: Path) -> tuple[Frame, MadeMasks | None]:
         if source.prompt is None and frame.object_ids:
             return frame, None
         again = overwrite or frames is not None
-        made = make_masks(source, frame, folder, seed, mask_config, overwrite=again)
-        return made, mask_config
+        return make_masks(source, frame, folder, seed, mask_config, overwrite=again)
 
     if frames is None:
         seen, masks = with_masks(seen, output)
@@ -242,13 +245,20 @@ def command(
         workers=workers,
     )
 
-    def one(frame: Frame, masks: SegmentConfig | None, output: Path) -> list[Told]:
+    def again(
+        frame: Frame, only: Collection[int], /, *, trial: TrialConfig | None = None
+    ) -> Reconstruction:
+        return run(frame, only=only, trial=trial)
+
+    def one(frame: Frame, masks: MadeMasks | None, output: Path) -> list[Told]:
         """Reconstruct a frame, write it all, and say what was written."""
-        result = run(frame)
+        with one_image(retrieval):
+            result = run(frame)
+            if masks is not None:
+                result = mend(result, prior, again, masks.config, masks.aside)
         if masks is not None:
-            result = mend(result, prior, lambda mended, ids: run(mended, only=ids), masks.mend)
             tell_mended(frame, result.frame, output)
-            result = replace(result, segmentation=asdict(masks))
+            result = replace(result, segmentation=asdict(masks.config))
         write_results(result, output, frame=coordinates, overwrite=overwrite)
         table = told(result)
         done = len(result.reconstructed)

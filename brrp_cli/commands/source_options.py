@@ -14,6 +14,9 @@ from brrp_cli.errors import FrameError
 from brrp_cli.files import exists
 
 if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
     from brrp_cli.config.segmentation import SegmentConfig
     from brrp_cli.frames.format import Request
     from brrp_cli.frames.frame import Frame
@@ -177,20 +180,23 @@ class SourceOptions:
         assert self.path is not None
         return list_frames(self.path, self.request)
 
-    def make_masks(self, frame: Frame, seed: int, config: SegmentConfig | None = None) -> Frame:
-        """The frame with masks made anew: by the prompt where there is one, else without a model.
+    def make_masks(
+        self, frame: Frame, seed: int, config: SegmentConfig | None = None
+    ) -> tuple[Frame, NDArray[np.int64] | None]:
+        """The frame with masks made anew, by the prompt where there is one, else without a model;
+        and the masks (H, W) that were left out, 0 = none.
 
         Errors: FrameError if nothing is found; MaskError if the models cannot be used.
         """
         from dataclasses import replace
 
-        from brrp_cli.segmentation.segment import segment
+        from brrp_cli.segmentation.segment import segment_and_aside
 
         if self.prompt is None:
-            return replace(frame, segmap=segment(frame, seed, config, keep_all=self.keep_all))
-        return replace(
-            frame, segmap=_prompt_segmenter(self.masks_dir, config)(frame, self.prompt, seed)
-        )
+            segmap, aside = segment_and_aside(frame, seed, config, keep_all=self.keep_all)
+            return replace(frame, segmap=segmap), aside
+        segmap = _prompt_segmenter(self.masks_dir, config)(frame, self.prompt, seed)
+        return replace(frame, segmap=segmap), None
 
 
 @cache

@@ -128,7 +128,8 @@ class SearchConfig:
     whose logarithm is within `least_size_change` of 0 or beyond `most_size` are dropped. Its
     alignment score falls by size_cost + size_spread_cost * ln(size)^2. No other size is tried where
     the score reaches `settled`, and nothing is refined further where none of the placements reaches
-    `hopeless` or all stay `beaten` behind another model's. Of placements whose surfaces lie within
+    `unpromising` after the first steps, or `hopeless` later, or all stay `beaten` behind another
+    model's. Of placements whose surfaces lie within
     `distinct` metres the best is kept, `kept` in all. An object is not placed at all where another
     one, with a score of `explained`, explains what is seen, and P(c|R) is less than a share
     `unlikely` of that one's.
@@ -170,6 +171,7 @@ class SearchConfig:
     size_spread_cost: float = 0.6
     least_size_change: float = 0.04
     most_size: float = 0.5
+    unpromising: float = -0.1
     hopeless: float = 0.1
     beaten: float = 0.3
     settled: float = 0.9
@@ -180,6 +182,20 @@ class SearchConfig:
     alignment_score: VerificationConfig = field(default_factory=VerificationConfig)
     colour: ColourConfig = field(default_factory=ColourConfig)
     about_itself: TurnConfig = field(default_factory=TurnConfig)
+
+
+@dataclass(frozen=True)
+class TrialConfig:
+    """A trial: does a stored object lie in this mask? It ends early where none does.
+
+    most_missing : P(not in the prior) beyond which nothing is placed; objects : stored ones that
+    are tried, the most probable; unpromising, hopeless : in the place of those of `SearchConfig`
+    """
+
+    most_missing: float = share(0.95)
+    objects: int = between(2, 1, 1000)
+    unpromising: float = between(0.1, -1.0, 1.0)
+    hopeless: float = between(0.35, -1.0, 1.0)
 
 
 @dataclass(frozen=True)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from brrp_cli.config.ranges import between, share
+from brrp_cli.config.registration import TrialConfig
 
 
 @dataclass(frozen=True)
@@ -287,6 +288,29 @@ class MendConfig:
 
 
 @dataclass(frozen=True)
+class RegroupConfig:
+    """Masks regrouped: of what was not recognised, neighbours are tried as one object, halves as
+    two, and what was left out as an object of its own.
+
+    most : tries in a frame at most; 0 = never
+    least_weight : of a stored object, from which on it is recognised in a mask that is tried;
+        explained : part of that mask that it explains as it was placed, at least
+    reach, gap : pixels and metres in depth within which masks are neighbours
+    least_pixels : with depth, of a mask that is tried; least_cut : of one that is cut in halves
+    trial : how a stored object is looked for in it
+    """
+
+    most: int = between(40, 0, 10_000)
+    least_weight: float = share(0.8)
+    explained: float = share(0.6)
+    reach: int = between(3, 1, 64)
+    gap: float = 0.015
+    least_pixels: int = 300
+    least_cut: int = 1000
+    trial: TrialConfig = field(default_factory=TrialConfig)
+
+
+@dataclass(frozen=True)
 class SegmentConfig:
     """Masks without a model, and in `prompt` those by a prompt, which use smooth_depth and table.
 
@@ -319,4 +343,5 @@ class SegmentConfig:
     borders: BordersConfig = field(default_factory=BordersConfig)
     left_out: LeftOutConfig = field(default_factory=LeftOutConfig)
     mend: MendConfig = field(default_factory=MendConfig)
+    regroup: RegroupConfig = field(default_factory=RegroupConfig)
     prompt: PromptConfig = field(default_factory=PromptConfig)

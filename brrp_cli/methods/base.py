@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from brrp_cli.config.registration import TrialConfig
 from brrp_cli.config.tracking import SharpenConfig
 from brrp_cli.errors import BrrpError, PriorError, WeightsError
 from brrp_cli.methods.configuration import MethodConfig
@@ -65,6 +66,8 @@ class Setup:
     workers : objects at a time; None = as many as there are cores. Results do not depend on it
     only : the ids that are asked for, for a method that works `object_by_object`; None = all
     stream : of which the frame is one, for a method that remembers; None = the frame stands alone
+    trial : no shapes are asked for, only which stored objects lie there; methods that weigh no
+        placements take no notice
     """
 
     config: Any
@@ -76,6 +79,7 @@ class Setup:
     workers: int | None = None
     only: frozenset[int] | None = None
     stream: Stream | None = None
+    trial: TrialConfig | None = None
 
 
 def _no_posteriors() -> tuple[type[StoredPosterior], ...]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import time
 from functools import partial
 from typing import TYPE_CHECKING
@@ -42,8 +43,10 @@ def run(frame: Frame, setup: Setup) -> Reconstruction:
     start = time.perf_counter()
     given = frame
     if config.hypotheses is not None:
-        frame = without_strays(frame, config.strays)
-    scene = observe(frame, config.observation, seed, workers)
+        frame = without_strays(frame, config.strays, setup.only if setup.trial is None else ())
+    # Of a trial nothing is inferred, from samples or otherwise.
+    samples = setup.trial is None or config.hypotheses is None
+    scene = observe(frame, config.observation, seed, workers, samples=samples)
     if config.hypotheses is not None:
         wave = wave_deviation(frame, scene.plane, config.hypotheses.sensor)
         noise = pixel_noise(frame, scene.plane, config.hypotheses.sensor)
@@ -55,7 +58,7 @@ def run(frame: Frame, setup: Setup) -> Reconstruction:
                 frame, observation, prior, retriever, config, seed=seed, device=device
             )
         earlier = None
-        if setup.stream is not None:
+        if setup.stream is not None and setup.trial is None:
             earlier = EarlierViews.of(
                 setup.stream.earlier.get(observation.object_id, ()), setup.stream.config
             )
@@ -71,12 +74,15 @@ def run(frame: Frame, setup: Setup) -> Reconstruction:
             seed=seed,
             device=device,
             earlier=earlier,
+            trial=setup.trial,
         )
 
     def whole(object_id: int) -> ObjectReconstruction:
         if object_id in scene.too_few:
             return too_few(object_id, scene.too_few[object_id], config.observation.min_points)
-        return with_surface(object_id, partial(one, scene.objects[object_id]), config.surface)
+        infer = partial(one, scene.objects[object_id])
+        level = logging.WARNING if setup.trial is None else logging.DEBUG
+        return with_surface(object_id, infer, config.surface, level)
 
     ids = [i for i in frame.object_ids if setup.only is None or i in setup.only]
     return Reconstruction(

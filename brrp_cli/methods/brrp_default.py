@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from functools import partial
 from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
 from brrp_cli.config import Config, FittedMapConfig, HypothesesConfig
+from brrp_cli.config.registration import TrialConfig
 from brrp_cli.frames.frame import Frame
 from brrp_cli.methods.earlier_views import ALONE, EarlierViews, remember
 from brrp_cli.methods.infer_object import infer_object, placed_shape
@@ -52,16 +55,20 @@ def reconstruct_by_hypotheses(
     seed: int,
     device: str,
     earlier: EarlierViews | None = None,
+    trial: TrialConfig | None = None,
 ) -> ObjectReconstruction:
     """Posterior of one object from hypotheses about the k retrieved objects and from the one that
     it is none of them, each corrected by what was observed.
 
     wave : metres, standard deviation of the mean depth of a patch (observation/sensor_noise.py);
     noise : of the frame's pixels; earlier : views of the object in the stream's earlier frames;
-    None = there is no stream
+    None = there is no stream; trial : nothing is inferred, only told which stored objects lie there
     """
     assert config.hypotheses is not None
     hypotheses = counted_once(config.hypotheses, knows_depth(retriever))
+    if trial is not None:
+        short = replace(hypotheses.search, unpromising=trial.unpromising, hopeless=trial.hopeless)
+        hypotheses = replace(hypotheses, search=short)
     seconds: dict[str, float] = {}
     object_id = observation.object_id
     views = ALONE if earlier is None else earlier
@@ -76,7 +83,8 @@ def reconstruct_by_hypotheses(
     with timed(seconds, "retrieval"):
         seen_now = retriever.probabilities(frame, object_id)
         probabilities = views.probabilities(seen_now)
-        chosen = top_k(probabilities, prior.names, config.k)
+        count = config.k if trial is None else min(config.k, trial.objects)
+        chosen = top_k(probabilities, prior.names, count)
         chosen += [
             (name, float(probabilities[prior.names.index(name)]))
             for name in begun
@@ -85,6 +93,18 @@ def reconstruct_by_hypotheses(
         missing = unknown(probabilities)
         # Stored objects that are not tried are as good as not in the prior.
         none_tried = unknown(np.array([probability for _, probability in chosen]))
+    told = partial(
+        ObjectReconstruction,
+        object_id=object_id,
+        status=OK,
+        n_points=len(observation.points),
+        center=observation.center,
+        observed=observation.points,
+        unknown_probability=missing,
+        seconds=seconds,
+    )
+    if trial is not None and missing > trial.most_missing:
+        return told(unknown_weight=1.0)
     with timed(seconds, "registration"):
         observed = observed_cloud(observation.points, config.features)
         lost = views.lost(hypotheses) if begun else frozenset()
@@ -142,6 +162,9 @@ def reconstruct_by_hypotheses(
             # What started from the last frame is not sure: it is searched for as ever.
             found = searched(views.hopeless())
             placed, alone, weights = weighed(found)
+        told = partial(told, unknown_weight=float(weights[-1]))
+        if trial is not None:
+            return told(retrieved=_all_retrieved(chosen, found, placed, weights))
         like: list[KinHypothesis] = []
         if weights[-1] >= hypotheses.kin.least_unknown:
             like = kin_hypotheses(
@@ -203,24 +226,13 @@ def reconstruct_by_hypotheses(
             child_rng(seed, "remembered", object_id),
             hypotheses,
         )
-    ends = np.cumsum([0, *(len(group) for group in found)])
-    return ObjectReconstruction(
-        object_id=object_id,
-        status=OK,
-        n_points=len(observation.points),
-        center=observation.center,
-        observed=observation.points,
-        retrieved=[
-            _retrieved(name, probability, placed[a:b], float(weights[a:b].sum()))
-            for (name, probability), a, b in zip(chosen, ends[:-1], ends[1:], strict=True)
-        ],
-        similar=[
-            Similar(each.shape.name, float(weights[-1]) * each.share, each.scales) for each in like
-        ],
-        unknown_probability=missing,
-        unknown_weight=float(weights[-1]),
+    similar = [
+        Similar(each.shape.name, float(weights[-1]) * each.share, each.scales) for each in like
+    ]
+    return told(
+        retrieved=_all_retrieved(chosen, found, placed, weights),
+        similar=similar,
         posterior=posterior,
-        seconds=seconds,
         memory=memory,
     )
 
@@ -281,6 +293,20 @@ def _shuffled(points: NDArray[np.float32], seed: int, object_id: int) -> Array:
     """In random order: every leading part covers what was seen."""
     rng = child_rng(seed, "testimony", object_id)
     return rng.permutation(points).astype(np.float64)
+
+
+def _all_retrieved(
+    chosen: list[tuple[str, float]],
+    found: list[list[Hypothesis]],
+    placed: list[Hypothesis],
+    weights: Array,
+) -> list[Retrieved]:
+    """Of each retrieved object its placements, of `placed`, as many as were `found`."""
+    ends = np.cumsum([0, *(len(group) for group in found)])
+    return [
+        _retrieved(name, probability, placed[a:b], float(weights[a:b].sum()))
+        for (name, probability), a, b in zip(chosen, ends[:-1], ends[1:], strict=True)
+    ]
 
 
 def _retrieved(name: str, probability: float, group: list[Hypothesis], weight: float) -> Retrieved:

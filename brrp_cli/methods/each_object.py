@@ -16,9 +16,13 @@ log = logging.getLogger(__name__)
 
 
 def with_surface(
-    object_id: int, infer: Callable[[], ObjectReconstruction], surface: SurfaceConfig
+    object_id: int,
+    infer: Callable[[], ObjectReconstruction],
+    surface: SurfaceConfig,
+    level: int = logging.WARNING,
 ) -> ObjectReconstruction:
-    """What `infer` says of one object, with its surface, or with the status of having failed.
+    """What `infer` says of one object, with its surface, or with the status of having failed, which
+    the log tells at that level.
 
     Errors: PriorError, since a damaged prior is no fault of the object that comes upon it.
     """
@@ -29,11 +33,11 @@ def with_surface(
     except PriorError:
         raise
     except BrrpError as error:
-        log.warning("Object %d: %s", object_id, error)
+        log.log(level, "Object %d: %s", object_id, error)
         return ObjectReconstruction(object_id, FAILED, str(error))
     except Exception as error:
         # A library stumbled: Open3D, SciPy and torch do, over shapes that nobody thought of.
-        log.warning("Object %d: an error that brrp does not know: %r", object_id, error)
+        log.log(level, "Object %d: an error that brrp does not know: %r", object_id, error)
         log.debug("Object %d", object_id, exc_info=True)
         message = f"an error that brrp does not know: {error!r} (--verbose shows the traceback)"
         return ObjectReconstruction(object_id, FAILED, message)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import weakref
+from collections.abc import Collection
 from dataclasses import replace
 
 import numpy as np
@@ -21,9 +22,11 @@ log = logging.getLogger(__name__)
 _clean: tuple[weakref.ref[Frame], StrayConfig] | None = None
 
 
-def without_strays(frame: Frame, config: StrayConfig) -> Frame:
+def without_strays(frame: Frame, config: StrayConfig, told: Collection[int] | None = None) -> Frame:
     """The frame, with no depth at pixels that their mask holds by mistake; the frame itself where
     there are none.
+
+    told : the objects of which the log tells; None = all
 
     Masks that are a pixel too wide hold what stands behind the object, and cameras mix the depths
     of both. One such pixel moves the middle of the object's bounding box by half its distance.
@@ -41,7 +44,7 @@ def without_strays(frame: Frame, config: StrayConfig) -> Frame:
             depth = np.where(own[window], frame.points[..., 2][window], np.nan)
             found = stray_pixels(depth, config)
             stray[window] |= found
-            if found.any():
+            if found.any() and (told is None or object_id in told):
                 log.info(
                     "Object %d: its mask is left without %d pixel(s) far from the object",
                     object_id,

@@ -66,7 +66,9 @@ def search(
     """
     T = _initial_poses(model, observed, verifier, features, config, seed)
     T, _ = best_of(T, model, verifier, config, config.begun, config.first_share)
-    T, _ = best_brought_nearer(T, model, verifier, config)
+    T, reached = best_brought_nearer(T, model, verifier, config)
+    if reached < config.unpromising:
+        return _judged(T[:1], model, verifier, config)
     T = brought_nearer(
         T, model, verifier, config.coarse_points, config.coarse_distance, config.coarse_steps
     )

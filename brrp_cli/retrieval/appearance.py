@@ -9,7 +9,8 @@ brrp_cli/config/retrieval.py.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 
 import numpy as np
@@ -62,6 +63,17 @@ class AppearanceRetriever:
         self._sensor = hypotheses.sensor
         self._frame: Frame | None = None
         self._answers: dict[int, NDArray[np.float64]] = {}
+        # What was seen of a mask of the present image, by the mask's bytes.
+        self._seen: dict[bytes, Similarity] | None = None
+
+    @contextmanager
+    def one_image(self) -> Iterator[None]:
+        """See retrieval/base.py."""
+        self._seen = {}
+        try:
+            yield
+        finally:
+            self._seen = self._frame = None
 
     def probabilities(self, frame: Frame, object_id: int) -> NDArray[np.float64]:
         """P(c|R) (n,) for one object of the frame, in the order of the prior's names; sum <= 1."""
@@ -83,11 +95,20 @@ class AppearanceRetriever:
 
     def evidence(self, frame: Frame) -> dict[int, Similarity]:
         """How alike every object of the frame is to the stored ones, by id."""
+        masks = {i: np.packbits(frame.segmap == i).tobytes() for i in frame.object_ids}
+        known = self._seen or {}
+        new = [i for i, mask in masks.items() if mask not in known]
+        found = self._compared(frame, new)
+        if self._seen is not None:
+            self._seen |= {masks[i]: found[i] for i in new}
+        return {i: found[i] if i in found else known[mask] for i, mask in masks.items()}
+
+    def _compared(self, frame: Frame, ids: Sequence[int]) -> dict[int, Similarity]:
         # Methods that leave strays out, and those that do not, get the same answer.
         frame = without_strays(frame, self._config.strays)
         plane, own = self.plane(frame), self._config.retrieval
         looks, points = {}, {}
-        for object_id in frame.object_ids:
+        for object_id in ids:
             seen = see_object(frame, object_id, plane, own.observed)
             histograms = lit_histograms(seen, self._gains)
             rows = self._shortlist.rows(seen, histograms)

@@ -6,7 +6,8 @@ is seen of one object can stand in.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, nullcontext
 from heapq import nsmallest
 from typing import Protocol
 
@@ -39,6 +40,16 @@ def knows_depth(retriever: Retriever) -> bool:
     """Whether P(c|R) follows from how stored objects lie over the measured depth, too: that depth
     is not to count a second time in full."""
     return bool(getattr(retriever, "aligns", False))
+
+
+@contextmanager
+def one_image(retriever: Retriever | None) -> Iterator[None]:
+    """While this lasts, all frames are one image with one mask or another. A retriever may give
+    what it saw of a mask again, though what else is masked changes it a little: it has a method
+    `one_image` then."""
+    begin = getattr(retriever, "one_image", nullcontext)
+    with begin():
+        yield
 
 
 def unknown(probabilities: NDArray[np.floating]) -> float:

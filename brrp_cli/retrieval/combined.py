@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+
 import numpy as np
 from numpy.typing import NDArray
 
 from brrp_cli.frames.frame import Frame
-from brrp_cli.retrieval.base import Retriever, knows_depth, unknown
+from brrp_cli.retrieval.base import Retriever, knows_depth, one_image, unknown
 
 
 class BothRetriever:
@@ -27,6 +30,12 @@ class BothRetriever:
     def aligns(self) -> bool:
         """Whether one of the two knows the depth."""
         return knows_depth(self._first) or knows_depth(self._second)
+
+    @contextmanager
+    def one_image(self) -> Iterator[None]:
+        """See retrieval/base.py."""
+        with one_image(self._first), one_image(self._second):
+            yield
 
     def probabilities(self, frame: Frame, object_id: int) -> NDArray[np.float64]:
         """P(c|R) (n,) for one object of the frame; the sum is that of the second retriever."""

@@ -12,11 +12,8 @@ from brrp_cli.config.segmentation import SegmentConfig
 from brrp_cli.dependencies import import_library
 from brrp_cli.errors import FrameError
 from brrp_cli.frames.frame import BACKGROUND, Frame
-from brrp_cli.geometry import backproject
 from brrp_cli.seeds import child_seed
-from brrp_cli.segmentation.components import find_parts, split_at_strongest
-from brrp_cli.segmentation.concave_edges import depth_jumps, hollow_creases, surface_normals
-from brrp_cli.segmentation.smooth_depth import flying_pixels, smooth_depth
+from brrp_cli.segmentation.cut import boundary_of, cut_at_strongest, filled
 
 log = logging.getLogger(__name__)
 
@@ -50,15 +47,9 @@ def split(
     mask = (frame.segmap == object_id) & frame.valid
     if mask.sum() < pieces:
         raise FrameError("The object has too few points with depth", where=frame.source)
-    raw = np.where(frame.valid, frame.points[..., 2], np.nan)
     config = config or SegmentConfig()
-    smoothing, edges = config.smooth_depth, config.concave_edges
-    depth = smooth_depth(np.where(flying_pixels(raw, smoothing), np.nan, raw), smoothing)
-    points = backproject(depth, frame.K)
-    crease = hollow_creases(points, surface_normals(points, edges), edges)
-    boundary = np.maximum(crease, depth_jumps(depth, frame.K, edges))
-    parts = split_at_strongest(find_parts(mask, boundary, config.components), boundary, pieces)
-    if len(np.unique(parts[parts > 0])) < pieces:
+    parts = cut_at_strongest(mask, boundary_of(frame, config), pieces, config)
+    if parts is None:
         log.info("Object %d has no such boundary inside: it is cut by nearness", object_id)
         parts = _by_nearness(frame, mask, pieces, seed)
     return _renumbered(frame.segmap, object_id, parts)
@@ -78,13 +69,8 @@ def _by_nearness(
 def _renumbered(
     segmap: NDArray[np.int64], object_id: int, parts: NDArray[np.int64]
 ) -> NDArray[np.int64]:
-    ndimage = import_library("scipy.ndimage")
     mask = segmap == object_id
-    rows, columns = ndimage.distance_transform_edt(
-        parts == 0, return_distances=False, return_indices=True
-    )
-    # Pixels of the object that are in no part, without depth or at edges, go to the nearest.
-    whole = np.where(mask, parts[rows, columns], 0)
+    whole = filled(mask, parts)
     labels, sizes = np.unique(whole[mask], return_counts=True)
     split = segmap.copy()
     for new, label in enumerate(labels[np.argsort(-sizes, kind="stable")]):

@@ -26,7 +26,7 @@ from brrp_cli.segmentation.concave_edges import (
     surface_normals,
 )
 from brrp_cli.segmentation.fill_concavities import fill_inside
-from brrp_cli.segmentation.left_out import left_out, told
+from brrp_cli.segmentation.left_out import IN_THE_AIR, left_out, told
 from brrp_cli.segmentation.merge_by_footprint import join_on_one_spot
 from brrp_cli.segmentation.refine_borders import refine_borders
 from brrp_cli.segmentation.region_growing import fill_holes, grow
@@ -53,6 +53,14 @@ def segment(
 
     Errors: FrameError if there is no table or nothing stands on it.
     """
+    return segment_and_aside(frame, seed, config, keep_all=keep_all)[0]
+
+
+def segment_and_aside(
+    frame: Frame, seed: int = 0, config: SegmentConfig | None = None, *, keep_all: bool = False
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """What `segment` gives, and the masks (H, W) that it left out because they seem to stand
+    nowhere on the table, 0 = none: what lies on something else may look like that."""
     ndimage = import_library("scipy.ndimage")
     config = config or SegmentConfig()
     raw = np.where(frame.valid, frame.points[..., 2], np.nan)
@@ -104,9 +112,10 @@ def segment(
     filled = fill_inside(segmap, table.plan(points), floor, config.concavities)
     segmap = refine_borders(filled, frame.rgb, filled != segmap, config.borders)
     segmap = fill_holes(segmap, ~frame.valid)
+    aside = np.zeros_like(segmap)
     if not keep_all:
-        segmap = _without(segmap, frame, table, config)
-    return _numbered(segmap, frame, config.min_area)
+        segmap, aside = _without(segmap, frame, table, config)
+    return _numbered(segmap, frame, config.min_area), aside
 
 
 def _creases(
@@ -126,15 +135,20 @@ def _creases(
 
 def _without(
     segmap: NDArray[np.int64], frame: Frame, table: Table, config: SegmentConfig
-) -> NDArray[np.int64]:
-    """The masks without those that are left out, which the log tells."""
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """The masks without those that are left out, which the log tells, and of the latter those that
+    stand nowhere."""
     segmap = _large(segmap, frame, config.min_area)
     points = np.where(frame.valid[..., None], frame.points, np.nan)
     height = table.plane.signed_distance(points)
     reasons = left_out(segmap, points[..., 2], height, config.left_out)
     if reasons:
         log.info("Masks left out: %s (--all keeps them)", told(reasons))
-    return np.where(np.isin(segmap, list(reasons)), BACKGROUND, segmap)
+    in_the_air = [i for i, reason in reasons.items() if reason == IN_THE_AIR]
+    return (
+        np.where(np.isin(segmap, list(reasons)), BACKGROUND, segmap),
+        np.where(np.isin(segmap, in_the_air), segmap, BACKGROUND),
+    )
 
 
 def _lift(

@@ -135,10 +135,13 @@ def test_no_other_size_is_tried_of_what_lies_well_enough():
     assert tried[0].alignment_score > settled[0].alignment_score
 
 
-def test_what_is_hopeless_is_judged_as_it_lies():
+@pytest.mark.parametrize("limit", ["unpromising", "hopeless"])
+def test_what_is_hopeless_is_judged_as_it_lies(limit):
     truth = placed(0.0, 0.03, 1.2)
-    left = find("ell", truth, size=0.8, config=replace(CONFIG, hopeless=np.inf, settled=np.inf))
-    assert left and {each.scale for each in left} == {1.0}
+    config = replace(CONFIG, settled=np.inf)
+    left = find("ell", truth, size=0.8, config=replace(config, **{limit: np.inf}))
+    assert len(left) == 1 and left[0].scale == 1.0
+    assert left[0].alignment_score < find("ell", truth, size=0.8, config=config)[0].alignment_score
 
 
 def test_what_another_model_has_beaten_is_judged_as_it_lies():

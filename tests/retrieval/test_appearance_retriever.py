@@ -11,9 +11,10 @@ from brrp_cli.prior.build.build import build_prior
 from brrp_cli.prior.parameters import BuildParameters
 from brrp_cli.prior.store import open_prior
 from brrp_cli.registration.model import search_model
+from brrp_cli.retrieval import appearance
 from brrp_cli.retrieval.aligned import PARTS, bare_model
 from brrp_cli.retrieval.appearance import AppearanceRetriever
-from brrp_cli.retrieval.base import unknown
+from brrp_cli.retrieval.base import one_image, unknown
 
 PLACES = {3: (-0.15, 0.1), 4: (0.12, 0.14), 8: (0.0, -0.02), 9: (0.2, -0.1), 11: (-0.2, -0.14)}
 STRANGER = 20
@@ -80,6 +81,23 @@ def test_the_papers_preset_aligns_as_the_default_does(prior, aligner):
         np.testing.assert_allclose(
             paper.probabilities(frame, object_id), aligner.probabilities(frame, object_id)
         )
+
+
+def test_of_one_image_what_was_seen_of_a_mask_counts_again(retriever, monkeypatch):
+    frame, names = scene()
+    joined = dataclasses.replace(frame, segmap=np.where(frame.segmap == 4, 3, frame.segmap))
+    fresh = retriever.evidence(frame)
+    seen = []
+    look = appearance.see_object
+    monkeypatch.setattr(appearance, "see_object", lambda *args: seen.append(args[1]) or look(*args))
+    with one_image(retriever):
+        assert retriever.evidence(frame).keys() == fresh.keys()
+        again = retriever.evidence(joined)
+        assert seen == [*frame.object_ids, 3]
+        for object_id in set(names) - {3, 4}:
+            np.testing.assert_array_equal(again[object_id].pairs, fresh[object_id].pairs)
+    retriever.evidence(joined)
+    assert len(seen) == len(frame.object_ids) + 1 + len(joined.object_ids)
 
 
 def test_a_stranger_is_told(retriever):

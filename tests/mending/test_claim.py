@@ -1,4 +1,4 @@
-"""Masks mended on the way from a frame to a reconstruction."""
+"""Masks that recognised objects claim, on the way from a frame to a reconstruction."""
 
 from __future__ import annotations
 
@@ -8,9 +8,11 @@ import numpy as np
 import pytest
 from table_scene import T_CAM_WORLD, TABLE, in_camera, photograph
 
-from brrp_cli.config.segmentation import MendConfig
+from brrp_cli.config.segmentation import MendConfig, SegmentConfig
 from brrp_cli.geometry import similarity
-from brrp_cli.mending import mend, mended_masks, rendered
+from brrp_cli.mending.claim import mended_masks
+from brrp_cli.mending.explain import rendered
+from brrp_cli.mending.mend import mend
 from brrp_cli.prior.build.build import build_prior
 from brrp_cli.prior.store import open_prior
 from brrp_cli.reconstruction import OK, ObjectReconstruction, Reconstruction, Retrieved
@@ -72,16 +74,17 @@ def test_what_changed_is_reconstructed_again_and_nothing_else(prior):
     first = reconstruction(frame, objects)
     asked = []
 
-    def again(frame, only):
+    def again(frame, only, *, trial=None):
+        assert trial is None
         asked.append(([*frame.object_ids], [*only]))
         return reconstruction(frame, [ObjectReconstruction(1, OK, n_points=5)])
 
-    result = mend(first, prior, again, MendConfig())
+    result = mend(first, prior, again, SegmentConfig())
     assert asked == [([1, 2], [1])]
     assert [item.n_points for item in result.objects] == [5, objects[1].n_points]
     assert np.array_equal(result.frame.segmap, whole.segmap)
     assert "mending" in result.seconds
-    never = mend(first, prior, again, MendConfig(rounds=0))
+    never = mend(first, prior, again, SegmentConfig(mend=MendConfig(rounds=0)))
     assert never.frame is frame and len(asked) == 1
     doubtful = replace(first, objects=[ObjectReconstruction(1, OK, retrieved=[placed(prior, 0.6)])])
     assert mended_masks(doubtful, prior, MendConfig()).segmap is frame.segmap

@@ -1,0 +1,1 @@
+"""Masks mended by what is recognised, and what they change reconstructed again."""

@@ -1,0 +1,48 @@
+"""Masks that were made on the way, mended by all that is recognised."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Collection
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brrp_cli.config.segmentation import SegmentConfig
+from brrp_cli.mending.again import Again
+from brrp_cli.mending.claim import claim
+from brrp_cli.mending.regroup import regroup
+from brrp_cli.prior.store import Prior
+from brrp_cli.reconstruction import Reconstruction
+
+
+def mend(
+    result: Reconstruction,
+    prior: Prior | None,
+    again: Again,
+    config: SegmentConfig,
+    aside: NDArray[np.integer] | None = None,
+    asked: Collection[int] | None = None,
+    first_free: int = 1,
+) -> Reconstruction:
+    """The reconstruction with masks that recognised objects claimed (claim.py), and that were
+    regrouped where that lets one be recognised (regroup.py), which then claims its own.
+
+    again : reconstructs those objects of a frame whose ids are given
+    aside : (H, W) masks that were left out, 0 = none; asked : ids whose masks may be regrouped,
+    None = all; first_free : ids of new objects are this at least
+    Its frame has the masks as they were mended; without a prior nothing is recognised and nothing
+    changes. `seconds` gains "mending".
+    """
+    if prior is None:
+        return result
+    start, first = time.perf_counter(), dict(result.seconds)
+    before = set(result.frame.object_ids)
+    mended = claim(result, prior, again, config.mend, first_free)
+    if asked is not None:
+        asked = set(asked) | (set(mended.frame.object_ids) - before)
+    grouped = regroup(mended, prior, again, config, aside, asked, first_free)
+    if grouped is not mended:
+        mended = claim(grouped, prior, again, config.mend, first_free)
+    return replace(mended, seconds={**first, "mending": time.perf_counter() - start})

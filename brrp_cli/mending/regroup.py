@@ -1,0 +1,100 @@
+"""Masks that are taken together or apart because a stored object is recognised in them then."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brrp_cli.config.segmentation import RegroupConfig, SegmentConfig
+from brrp_cli.frames.frame import BACKGROUND, Frame
+from brrp_cli.mending.again import Again, replaced
+from brrp_cli.mending.explain import explained
+from brrp_cli.prior.store import Prior
+from brrp_cli.reconstruction import ObjectReconstruction, Reconstruction
+from brrp_cli.segmentation.other_masks import OtherMask, in_turns, other_masks, painted
+
+
+@dataclass(frozen=True)
+class _Found:
+    """A mask in which a stored object is recognised, of which it explains so many pixels."""
+
+    mask: OtherMask
+    pixels: int
+
+
+def regroup(
+    result: Reconstruction,
+    prior: Prior,
+    again: Again,
+    config: SegmentConfig,
+    aside: NDArray[np.integer] | None = None,
+    asked: Collection[int] | None = None,
+    first_free: int = 1,
+) -> Reconstruction:
+    """The reconstruction with those other masks of what was not recognised in which a stored object
+    is: the ones that it explains most of, first. What is left of a mask keeps its id.
+
+    aside : (H, W) masks that were left out, 0 = none; asked : ids whose masks may be regrouped,
+    None = all; first_free : ids of new objects are this at least
+    """
+    frame, own = result.frame, config.regroup
+    doubtful = [
+        each.object_id
+        for each in result.objects
+        # A method that weighs no placements recognises nothing.
+        if each.unknown_weight is not None
+        and (asked is None or each.object_id in asked)
+        and not _recognised(each, own)
+    ]
+    if not own.most or not any(each.unknown_weight is not None for each in result.objects):
+        return result
+    found: list[_Found] = []
+    for turn in in_turns(other_masks(frame, doubtful, aside, config)):
+        segmap, named = painted(frame.segmap, turn, first_free)
+        tried = replace(frame, segmap=segmap)
+        for each in again(tried, named.keys(), trial=own.trial).objects:
+            if each.object_id not in named or not _recognised(each, own):
+                continue
+            mask = named[each.object_id]
+            assert each.recognised is not None
+            pixels = explained(each.recognised, mask.mask & frame.valid, prior, frame, config.mend)
+            if pixels >= own.explained * (mask.mask & frame.valid).sum():
+                found.append(_Found(mask, pixels))
+    chosen = _chosen(found)
+    if not chosen:
+        return result
+    segmap, named = painted(frame.segmap, chosen, first_free)
+    segmap = _without_scraps(segmap, named, frame, own)
+    changed = set(named).union(*(each.of for each in chosen))
+    return replaced(result, replace(frame, segmap=segmap), changed, again)
+
+
+def _recognised(item: ObjectReconstruction, config: RegroupConfig) -> bool:
+    found = item.recognised
+    return found is not None and (found.weight or 0.0) >= config.least_weight
+
+
+def _chosen(found: Sequence[_Found]) -> list[OtherMask]:
+    """Those that explain most, without such as overlap a better one."""
+    chosen: list[OtherMask] = []
+    for each in sorted(found, key=lambda each: -each.pixels):
+        if not any((each.mask.mask & other.mask).any() for other in chosen):
+            chosen.append(each.mask)
+    return chosen
+
+
+def _without_scraps(
+    segmap: NDArray[np.int64], named: dict[int, OtherMask], frame: Frame, config: RegroupConfig
+) -> NDArray[np.int64]:
+    """What is left of a mask that was cut stays with the part that was recognised, where it would
+    be no object."""
+    segmap = segmap.copy()
+    for object_id, mask in named.items():
+        for source in mask.of - {object_id}:
+            left = segmap == source
+            if source != BACKGROUND and (left & frame.valid).sum() < config.least_pixels:
+                segmap[left] = object_id
+    return segmap

@@ -1,0 +1,43 @@
+"""One mask cut into pieces where its inner boundary is strongest."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brrp_cli.config.segmentation import SegmentConfig
+from brrp_cli.dependencies import import_library
+from brrp_cli.frames.frame import Frame
+from brrp_cli.geometry import backproject
+from brrp_cli.segmentation.components import find_parts, split_at_strongest
+from brrp_cli.segmentation.concave_edges import depth_jumps, hollow_creases, surface_normals
+from brrp_cli.segmentation.smooth_depth import flying_pixels, smooth_depth
+
+
+def boundary_of(frame: Frame, config: SegmentConfig) -> NDArray[np.float64]:
+    """Jumps of depth and hollow creases (H, W), 0 to 1."""
+    raw = np.where(frame.valid, frame.points[..., 2], np.nan)
+    smoothing, edges = config.smooth_depth, config.concave_edges
+    depth = smooth_depth(np.where(flying_pixels(raw, smoothing), np.nan, raw), smoothing)
+    points = backproject(depth, frame.K)
+    crease = hollow_creases(points, surface_normals(points, edges), edges)
+    return np.maximum(crease, depth_jumps(depth, frame.K, edges))
+
+
+def cut_at_strongest(
+    mask: NDArray[np.bool_], boundary: NDArray[np.float64], pieces: int, config: SegmentConfig
+) -> NDArray[np.int64] | None:
+    """Labels (H, W) of so many parts of a mask (H, W), of pixels with depth, 0 = in none; None
+    where it has no such boundary inside."""
+    parts = split_at_strongest(find_parts(mask, boundary, config.components), boundary, pieces)
+    return parts if len(np.unique(parts[parts > 0])) == pieces else None
+
+
+def filled(mask: NDArray[np.bool_], parts: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Labels (H, W) of all of a mask: pixels that are in no part, without depth or at edges, go to
+    the nearest; 0 outside the mask."""
+    ndimage = import_library("scipy.ndimage")
+    rows, columns = ndimage.distance_transform_edt(
+        parts == 0, return_distances=False, return_indices=True
+    )
+    return np.where(mask, parts[rows, columns], 0)

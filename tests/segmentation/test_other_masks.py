@@ -1,0 +1,98 @@
+"""Masks that may be of one object, or of two, on images whose parts are known."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from table_scene import K, in_camera, photograph, placed
+
+from brrp_cli.config.segmentation import RegroupConfig, SegmentConfig
+from brrp_cli.frames.frame import Frame
+from brrp_cli.geometry import backproject
+from brrp_cli.segmentation.other_masks import OtherMask, in_turns, other_masks, painted, unions
+from brrp_cli.shapes import solids
+
+CONFIG = RegroupConfig()
+
+
+def row_of_masks(gaps=(0, 0), depths=(0.8, 0.8, 0.8)):
+    """Masks 1, 2, 3 of 40 x 20 pixels in a row, so many pixels and so far apart."""
+    segmap, depth = np.zeros((80, 120), np.int64), np.full((80, 120), 1.0)
+    left = 20
+    for i, (gap, far) in enumerate(zip((*gaps, 0), depths, strict=True), start=1):
+        part = np.s_[20:60, left : left + 20]
+        segmap[part], depth[part] = i, far
+        left += 20 + gap
+    return Frame(np.zeros((80, 120, 3), np.uint8), backproject(depth, K), segmap, K)
+
+
+def test_of_a_chain_all_are_one_try_and_each_two_neighbours_another():
+    found = unions(row_of_masks(), [1, 2, 3], CONFIG)
+    assert found == [{1, 2, 3}, {1, 2}, {2, 3}]
+    assert unions(row_of_masks(), [1, 2], CONFIG) == [{1, 2}]
+    assert unions(row_of_masks(), [1, 3], CONFIG) == []
+
+
+@pytest.mark.parametrize(("gap", "near"), [(CONFIG.reach - 1, True), (CONFIG.reach, False)])
+def test_neighbours_are_near_in_the_image(gap, near):
+    assert bool(unions(row_of_masks((gap, 40)), [1, 2], CONFIG)) == near
+
+
+@pytest.mark.parametrize(("apart", "near"), [(0.9, True), (1.1, False)])
+def test_neighbours_are_near_in_depth(apart, near):
+    frame = row_of_masks(depths=(0.8, 0.8 + apart * CONFIG.gap, 2.0))
+    assert bool(unions(frame, [1, 2], CONFIG)) == near
+
+
+def test_two_things_in_one_mask_are_its_halves():
+    first, second = (
+        in_camera(solids.box(0.08, 0.08, high), placed(x, 0.0, 0.3))
+        for x, high in ((-0.1, 0.1), (0.06, 0.05))
+    )
+    truth = photograph({1: first, 2: second})
+    frame = replace(truth, segmap=np.where(truth.segmap > 0, 7, 0))
+    halves = other_masks(frame, [7], None, SegmentConfig())
+    assert [each.of for each in halves] == [{7}, {7}]
+    for object_id in (1, 2):
+        mask = truth.segmap == object_id
+        assert max((each.mask & mask).sum() / (each.mask | mask).sum() for each in halves) > 0.95
+    alone = replace(truth, segmap=np.where(truth.segmap == 1, 1, 0))
+    assert other_masks(alone, [1], None, SegmentConfig()) == []
+
+
+def test_what_was_left_out_is_tried_where_nothing_else_is():
+    frame = row_of_masks()
+    aside = np.roll(np.where(frame.segmap == 3, 5, 0), 10, axis=1)
+    (found,) = other_masks(frame, [], aside, SegmentConfig())
+    assert not found.of and (found.mask == ((aside == 5) & (frame.segmap == 0))).all()
+    few = SegmentConfig(regroup=replace(CONFIG, least_pixels=int(found.mask.sum()) + 1))
+    assert other_masks(frame, [], aside, few) == []
+
+
+def test_there_are_no_more_tries_than_allowed():
+    frame, config = row_of_masks(), SegmentConfig(regroup=replace(CONFIG, most=2))
+    assert len(other_masks(frame, [1, 2, 3], None, config)) == 2
+
+
+def test_masks_of_one_turn_do_not_overlap_and_none_is_lost():
+    frame = row_of_masks()
+    groups = unions(frame, [1, 2, 3], CONFIG)
+    masks = [OtherMask(np.isin(frame.segmap, list(of)), of) for of in groups]
+    masks.append(OtherMask(frame.segmap == 1, frozenset([1])))
+    turns = in_turns(masks)
+    assert [len(turn) for turn in turns] == [1, 1, 2]
+    assert sorted(map(id, masks)) == sorted(id(each) for turn in turns for each in turn)
+    for turn in turns:
+        assert (sum(each.mask.astype(int) for each in turn) <= 1).all()
+
+
+def test_a_union_has_its_lowest_id_and_a_part_a_new_one():
+    frame = row_of_masks()
+    union = OtherMask(frame.segmap >= 2, frozenset([2, 3]))
+    part = OtherMask((frame.segmap == 1) & (np.arange(120) < 30), frozenset([1]))
+    segmap, named = painted(frame.segmap, [union, part], 1)
+    assert named == {2: union, 4: part}
+    assert set(np.unique(segmap)) == {0, 1, 2, 4}
+    assert (painted(frame.segmap, [part], 9)[0] == 9).sum() == part.mask.sum()
