@@ -8,19 +8,23 @@ result.objects[0].surface.as_trimesh()
 from __future__ import annotations
 
 import time
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
+from numpy.typing import NDArray
+
 from brrp_cli.config.registration import TrialConfig
+from brrp_cli.errors import BrrpError
 from brrp_cli.frames.frame import Frame
-from brrp_cli.methods.base import Setup, Stream
+from brrp_cli.methods.base import Method, Setup, Stream, Trial
 from brrp_cli.methods.configuration import MethodConfig
 from brrp_cli.methods.posterior_file import open_posterior
 from brrp_cli.methods.registry import DEFAULT, reconstructing_method
 from brrp_cli.prior.store import Prior
-from brrp_cli.reconstruction import Reconstruction
+from brrp_cli.reconstruction import ObjectReconstruction, Reconstruction
 from brrp_cli.results import read
 from brrp_cli.results.read import StoredResult
 
@@ -41,7 +45,6 @@ def reconstruct(
     workers: int | None = None,
     only: Collection[int] | None = None,
     stream: Stream | None = None,
-    trial: TrialConfig | None = None,
 ) -> Reconstruction:
     """Reconstruct every object of a segmented frame.
 
@@ -54,7 +57,6 @@ def reconstruct(
     only : ids of the objects that are asked for, by default all; the others are still seen as
         objects
     stream : what earlier frames of the same stream showed (sessions pass it)
-    trial : only looks which stored objects lie there, and gives no shapes (mending of masks does)
 
     An object that cannot be reconstructed gets a status; the others still are. The frame is never
     changed. The same seed gives the same result, whatever the number of workers.
@@ -62,7 +64,58 @@ def reconstruct(
     Errors: BrrpError for an unknown method, or a prior, retriever, weights or configuration that
     it lacks or cannot use; PriorError for a shard that is damaged, when an object is read from it.
     """
+    start = time.perf_counter()
     chosen = reconstructing_method(method)
+    setup = _setup(
+        chosen, prior, config, retriever, weights, seed=seed, device=device, workers=workers
+    )
+    setup = replace(setup, only=None if only is None else frozenset(only), stream=stream)
+    seconds = {"retriever": time.perf_counter() - start} if chosen.uses_retriever else {}
+    result = chosen.run(frame, setup)
+    objects = [each for each in result.objects if only is None or each.object_id in only]
+    return replace(result, objects=objects, seconds={**seconds, **result.seconds})
+
+
+def try_masks(
+    frame: Frame,
+    masks: Sequence[NDArray[np.bool_]],
+    trial: TrialConfig,
+    prior: Prior | None = None,
+    *,
+    method: str = DEFAULT,
+    config: MethodConfig | None = None,
+    retriever: Retriever | str | None = None,
+    weights: str | Path | None = None,
+    seed: int = 0,
+    device: str = "auto",
+    workers: int | None = None,
+) -> list[ObjectReconstruction]:
+    """Which stored objects lie in each of other masks (H, W) of a frame, each in the place of the
+    frame's own masks there: what it is taken for, without a shape.
+
+    The rest is as in `reconstruct`. Errors: BrrpError, also for a method that weighs no placements.
+    """
+    chosen = reconstructing_method(method)
+    if chosen.try_masks is None:
+        raise BrrpError(f"{method} weighs no placements, and cannot try masks")
+    setup = _setup(
+        chosen, prior, config, retriever, weights, seed=seed, device=device, workers=workers
+    )
+    return chosen.try_masks(frame, setup, Trial(masks, trial))
+
+
+def _setup(
+    chosen: Method,
+    prior: Prior | None,
+    config: MethodConfig | None,
+    retriever: Retriever | str | None,
+    weights: str | Path | None,
+    *,
+    seed: int,
+    device: str,
+    workers: int | None,
+) -> Setup:
+    """What a method is given, checked. Errors: BrrpError."""
     if isinstance(retriever, str) and not chosen.uses_retriever:
         raise chosen.takes_no_retriever()
     setup = Setup(
@@ -73,21 +126,14 @@ def reconstruct(
         retriever=None if isinstance(retriever, str) else retriever,
         weights=None if weights is None else Path(weights),
         workers=workers,
-        only=None if only is None else frozenset(only),
-        stream=stream,
-        trial=trial,
     )
     chosen.check(setup)
-    start = time.perf_counter()
     if chosen.uses_retriever and setup.retriever is None and prior is not None:
         from brrp_cli.retrieval.choose import choose_retriever
 
         name = retriever if isinstance(retriever, str) else "auto"
         setup = replace(setup, retriever=choose_retriever(name, prior, setup.config, seed))
-    seconds = {"retriever": time.perf_counter() - start} if chosen.uses_retriever else {}
-    result = chosen.run(frame, setup)
-    objects = [each for each in result.objects if only is None or each.object_id in only]
-    return replace(result, objects=objects, seconds={**seconds, **result.seconds})
+    return setup
 
 
 def open_result(folder: str | Path) -> StoredResult:

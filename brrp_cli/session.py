@@ -9,7 +9,7 @@ for frame in camera:
 from __future__ import annotations
 
 import time
-from collections.abc import Collection, Iterable, Iterator
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from dataclasses import asdict, replace
 from functools import partial
 from pathlib import Path
@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from brrp_cli.api import reconstruct
+from brrp_cli.api import reconstruct, try_masks
 from brrp_cli.config.registration import TrialConfig
 from brrp_cli.config.segmentation import SegmentConfig
 from brrp_cli.config.tracking import SharpenConfig, TrackConfig
@@ -174,14 +174,13 @@ class Reconstructor:
     def _mended(
         self,
         result: Reconstruction,
-        again: Again,
+        infer: Callable[[Frame, Collection[int]], Reconstruction],
         aside: NDArray[np.int64] | None,
         asked: Collection[int] | None = None,
         first_free: int = 1,
     ) -> Reconstruction:
-        return mend(
-            result, self._prior, again, self._segmentation, aside, asked, first_free=first_free
-        )
+        again = Again(infer, self._tried)
+        return mend(result, self._prior, again, self._segmentation, aside, asked, first_free)
 
     def _stream(self, frame: Frame, ids: Collection[int]) -> Stream | None:
         """What earlier frames showed of those objects of this one that are at rest since; all else
@@ -232,7 +231,6 @@ class Reconstructor:
         only: Collection[int] | None = None,
         *,
         stream: Stream | None = None,
-        trial: TrialConfig | None = None,
     ) -> Reconstruction:
         return reconstruct(
             frame,
@@ -246,7 +244,23 @@ class Reconstructor:
             workers=self._workers,
             only=only,
             stream=stream,
-            trial=trial,
+        )
+
+    def _tried(
+        self, frame: Frame, masks: Sequence[NDArray[np.bool_]], trial: TrialConfig
+    ) -> list[ObjectReconstruction]:
+        return try_masks(
+            frame,
+            masks,
+            trial,
+            self._prior,
+            method=self._method,
+            config=self._config,
+            retriever=self._retriever,
+            weights=self._weights,
+            seed=self._seed,
+            device=self._device,
+            workers=self._workers,
         )
 
     def stream(self, frames: Iterable[Frame]) -> Iterator[Reconstruction | FrameError]:

@@ -40,9 +40,8 @@ from brrp_cli.retrieval.choose import RETRIEVERS, choose_retriever
 from brrp_cli.retrieval.clip.model_files import CLIP_DIR_VARIABLE
 
 if TYPE_CHECKING:
-    from collections.abc import Collection
+    from collections.abc import Callable
 
-    from brrp_cli.config.registration import TrialConfig
     from brrp_cli.frames.frame import Frame
     from brrp_cli.grasping.gripper import Gripper
     from brrp_cli.methods.base import Method
@@ -194,8 +193,9 @@ def command(
     source.check()
     check_weights([method], [] if weights is None else [weights])
 
-    from brrp_cli.api import open_result, reconstruct
+    from brrp_cli.api import open_result, reconstruct, try_masks
     from brrp_cli.config.segmentation import SegmentConfig
+    from brrp_cli.mending.again import Again
     from brrp_cli.mending.mend import mend
     from brrp_cli.methods.config_file import read_config
     from brrp_cli.methods.configuration import as_record
@@ -233,22 +233,18 @@ def command(
     if prior is None:
         trained = "" if weights is None else f", weights {weights}"
         note(f"Method: {method}, without a prior{trained}")
-    run = partial(
-        reconstruct,
-        prior=prior,
-        method=method,
-        config=config,
-        retriever=retrieval,
-        weights=weights,
-        seed=seed,
-        device=device,
-        workers=workers,
-    )
-
-    def again(
-        frame: Frame, only: Collection[int], /, *, trial: TrialConfig | None = None
-    ) -> Reconstruction:
-        return run(frame, only=only, trial=trial)
+    given: dict[str, Any] = {
+        "prior": prior,
+        "method": method,
+        "config": config,
+        "retriever": retrieval,
+        "weights": weights,
+        "seed": seed,
+        "device": device,
+        "workers": workers,
+    }
+    run: Callable[..., Reconstruction] = partial(reconstruct, **given)
+    again = Again(lambda frame, ids: run(frame, only=ids), partial(try_masks, **given))
 
     def one(frame: Frame, masks: MadeMasks | None, output: Path) -> list[Told]:
         """Reconstruct a frame, write it all, and say what was written."""

@@ -65,9 +65,10 @@ class ColourConfig:
     is not quite the one that was scanned. It counts in full from a standard deviation of `textured`
     (of 255) on. Colours are means over cells of `cell` metres, of at most `vertices` vertices, of
     which `least_seen` have to be within `near` metres of the measured depth; what differs by less
-    than `plain` (of 255) is of one colour.
+    than `plain` (of 255) is of one colour. asked : whether any of this is done
     """
 
+    asked: bool = True
     turns: int = 24
     apart: float = 0.5
     alike: float = 0.2
@@ -189,11 +190,13 @@ class TrialConfig:
     """A trial: does a stored object lie in this mask? It ends early where none does.
 
     most_missing : P(not in the prior) beyond which nothing is placed; objects : stored ones that
-    are tried, the most probable; unpromising, hopeless : in the place of those of `SearchConfig`
+    are tried, the most probable, of which the others have `likely` times the P(c|R) of the first;
+    unpromising, hopeless : in the place of those of `SearchConfig`
     """
 
-    most_missing: float = share(0.95)
+    most_missing: float = share(0.9)
     objects: int = between(2, 1, 1000)
+    likely: float = share(0.1)
     unpromising: float = between(0.1, -1.0, 1.0)
     hopeless: float = between(0.35, -1.0, 1.0)
 
@@ -246,7 +249,8 @@ class LikelihoodConfig:
     stored objects lie over the measured depth, which would count twice
     most_votes : that all votes can come to; base : nats of any placement
     other_size : nats against a placement at another size than the stored one
-    within : placements whose alignment score is less than the best by more have no weight
+    within : placements whose alignment score is less than the best by more have no weight, nor have
+        those with less than `least_alignment`
     refined_from : nats; where the best placement of a stored object reaches them, it is refined by
         rays and judged again
     """
@@ -277,6 +281,7 @@ class LikelihoodConfig:
     base: float = between(1.0, -50.0, 50.0)
     other_size: float = 3.6
     within: float = 0.5
+    least_alignment: float = between(0.25, -1.0, 1.0)
     refined_from: float = between(-6.0, -1000.0, 1000.0)
 
 

@@ -95,7 +95,7 @@ class AlignmentConfig:
     most : objects whose placements are refined, the best by likenesses and first score; where none
         of them reaches the score `enough`, so are the next `more`
     rounds : of so many objects, the most probable first; one that reaches the score `certain` ends
-        them
+        them; hasty_rounds : of a mask that is only tried
     last : objects that are refined once more in the end, the best by likeness and score; the more
         points, the better shapes that are nearly alike are told apart
     least_points : of the object that have to be seen
@@ -111,6 +111,7 @@ class AlignmentConfig:
     from_objects: int = 100
     tried: int = 80
     rounds: int = 3
+    hasty_rounds: int = 1
     certain: float = share(0.92)
     margin: float = 12.0
     first: float = 30.0

@@ -289,24 +289,38 @@ class MendConfig:
 
 @dataclass(frozen=True)
 class RegroupConfig:
-    """Masks regrouped: of what was not recognised, neighbours are tried as one object, halves as
-    two, and what was left out as an object of its own.
+    """Masks regrouped: of what was not recognised, neighbours are tried as one object, parts as
+    objects of their own, and so is what was left out.
 
-    most : tries in a frame at most; 0 = never
+    rounds : times that this is done at most, of what the last one changed; 0 = never
+    most : tries in a round at most
     least_weight : of a stored object, from which on it is recognised in a mask that is tried;
         explained : part of that mask that it explains as it was placed, at least
     reach, gap : pixels and metres in depth within which masks are neighbours
-    least_pixels : with depth, of a mask that is tried; least_cut : of one that is cut in halves
+    least_pixels : with depth, of a mask that is tried; least_cut : of one that is cut
+    colours : numbers of groups of pixels that are alike in colour and place; places : what a pixel
+        of distance counts against a unit of L*a*b*, of each of these groupings; lightness : of a
+        unit of L*; blur : pixels, deviation; samples : pixels from which groups are found; differs
+        : L*a*b*, of a group from the rest of its mask, at least
+    same : a part that differs by less than that share from another one is not tried again
     trial : how a stored object is looked for in it
     """
 
-    most: int = between(40, 0, 10_000)
+    rounds: int = between(3, 0, 10)
+    most: int = between(60, 0, 10_000)
     least_weight: float = share(0.8)
     explained: float = share(0.6)
     reach: int = between(3, 1, 64)
     gap: float = 0.015
     least_pixels: int = 300
     least_cut: int = 1000
+    colours: tuple[int, ...] = (2, 4)
+    places: tuple[float, ...] = (0.32,)
+    lightness: float = 0.5
+    blur: float = 1.5
+    samples: int = between(2000, 10, 1_000_000)
+    differs: float = 10.0
+    same: float = share(0.1)
     trial: TrialConfig = field(default_factory=TrialConfig)
 
 

@@ -2,22 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
-from dataclasses import replace
-from typing import Protocol
+from collections.abc import Callable, Collection, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
 
 from brrp_cli.config.registration import TrialConfig
 from brrp_cli.frames.frame import Frame
-from brrp_cli.reconstruction import Reconstruction
+from brrp_cli.reconstruction import ObjectReconstruction, Reconstruction
 
 
-class Again(Protocol):
-    """Reconstructs those objects of a frame whose ids are given."""
+@dataclass(frozen=True)
+class Again:
+    """objects : reconstructs those objects of a frame whose ids are given
+    masks : looks which stored objects lie in each of other masks (H, W) of a frame
+    """
 
-    def __call__(
-        self, frame: Frame, only: Collection[int], /, *, trial: TrialConfig | None = None
-    ) -> Reconstruction:
-        """trial : only looks which stored objects lie there"""
+    objects: Callable[[Frame, Collection[int]], Reconstruction]
+    masks: Callable[[Frame, Sequence[NDArray[np.bool_]], TrialConfig], list[ObjectReconstruction]]
 
 
 def replaced(
@@ -28,6 +31,6 @@ def replaced(
     asked = set(changed) & set(frame.object_ids)
     stay = set(frame.object_ids) - asked
     kept = [each for each in result.objects if each.object_id in stay]
-    result = again(frame, asked) if asked else replace(result, frame=frame)
+    result = again.objects(frame, asked) if asked else replace(result, frame=frame)
     objects = [*kept, *(each for each in result.objects if each.object_id in asked)]
     return replace(result, objects=sorted(objects, key=lambda each: each.object_id))

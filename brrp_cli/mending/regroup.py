@@ -14,7 +14,7 @@ from brrp_cli.mending.again import Again, replaced
 from brrp_cli.mending.explain import explained
 from brrp_cli.prior.store import Prior
 from brrp_cli.reconstruction import ObjectReconstruction, Reconstruction
-from brrp_cli.segmentation.other_masks import OtherMask, in_turns, other_masks, painted
+from brrp_cli.segmentation.other_masks import OtherMask, other_masks, painted
 
 
 @dataclass(frozen=True)
@@ -35,34 +35,52 @@ def regroup(
     first_free: int = 1,
 ) -> Reconstruction:
     """The reconstruction with those other masks of what was not recognised in which a stored object
-    is: the ones that it explains most of, first. What is left of a mask keeps its id.
+    is: the ones that it explains most of, first. What is left of a mask keeps its id, and may be
+    regrouped in the next round.
 
     aside : (H, W) masks that were left out, 0 = none; asked : ids whose masks may be regrouped,
     None = all; first_free : ids of new objects are this at least
     """
+    # A method that weighs no placements recognises nothing.
+    if not any(each.unknown_weight is not None for each in result.objects):
+        return result
+    for _ in range(config.regroup.rounds):
+        before = result
+        result = _one_round(before, prior, again, config, aside, asked, first_free)
+        if result is before:
+            break
+        old = {each.object_id: each for each in before.objects}
+        asked = [i.object_id for i in result.objects if old.get(i.object_id) is not i]
+        aside = None
+    return result
+
+
+def _one_round(
+    result: Reconstruction,
+    prior: Prior,
+    again: Again,
+    config: SegmentConfig,
+    aside: NDArray[np.integer] | None,
+    asked: Collection[int] | None,
+    first_free: int,
+) -> Reconstruction:
     frame, own = result.frame, config.regroup
     doubtful = [
         each.object_id
         for each in result.objects
-        # A method that weighs no placements recognises nothing.
-        if each.unknown_weight is not None
-        and (asked is None or each.object_id in asked)
-        and not _recognised(each, own)
+        if (asked is None or each.object_id in asked) and not _recognised(each, own)
     ]
-    if not own.most or not any(each.unknown_weight is not None for each in result.objects):
-        return result
+    masks = other_masks(frame, doubtful, aside, config, result.seed)
     found: list[_Found] = []
-    for turn in in_turns(other_masks(frame, doubtful, aside, config)):
-        segmap, named = painted(frame.segmap, turn, first_free)
-        tried = replace(frame, segmap=segmap)
-        for each in again(tried, named.keys(), trial=own.trial).objects:
-            if each.object_id not in named or not _recognised(each, own):
-                continue
-            mask = named[each.object_id]
-            assert each.recognised is not None
-            pixels = explained(each.recognised, mask.mask & frame.valid, prior, frame, config.mend)
-            if pixels >= own.explained * (mask.mask & frame.valid).sum():
-                found.append(_Found(mask, pixels))
+    tried = again.masks(frame, [each.mask for each in masks], own.trial) if masks else []
+    for mask, item in zip(masks, tried, strict=True):
+        if not _recognised(item, own):
+            continue
+        assert item.recognised is not None
+        seen = mask.mask & frame.valid
+        pixels = explained(item.recognised, seen, prior, frame, config.mend)
+        if pixels >= own.explained * seen.sum():
+            found.append(_Found(mask, pixels))
     chosen = _chosen(found)
     if not chosen:
         return result

@@ -6,7 +6,7 @@ Python, the commands, sessions and evaluations find it there; nothing else has t
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
@@ -22,7 +22,7 @@ from brrp_cli.methods.configuration import MethodConfig
 if TYPE_CHECKING:
     from brrp_cli.frames.frame import Frame
     from brrp_cli.prior.store import Prior
-    from brrp_cli.reconstruction import Reconstruction, StoredPosterior
+    from brrp_cli.reconstruction import ObjectReconstruction, Reconstruction, StoredPosterior
     from brrp_cli.retrieval.base import Retriever
 
 
@@ -58,6 +58,15 @@ class Stream:
 
 
 @dataclass(frozen=True)
+class Trial:
+    """Which stored objects lie in masks (H, W) that take the place of the frame's own, one at a
+    time?"""
+
+    masks: Sequence[NDArray[np.bool_]]
+    config: TrialConfig
+
+
+@dataclass(frozen=True)
 class Setup:
     """What a method may need besides the frame.
 
@@ -66,8 +75,6 @@ class Setup:
     workers : objects at a time; None = as many as there are cores. Results do not depend on it
     only : the ids that are asked for, for a method that works `object_by_object`; None = all
     stream : of which the frame is one, for a method that remembers; None = the frame stands alone
-    trial : no shapes are asked for, only which stored objects lie there; methods that weigh no
-        placements take no notice
     """
 
     config: Any
@@ -79,7 +86,6 @@ class Setup:
     workers: int | None = None
     only: frozenset[int] | None = None
     stream: Stream | None = None
-    trial: TrialConfig | None = None
 
 
 def _no_posteriors() -> tuple[type[StoredPosterior], ...]:
@@ -99,6 +105,8 @@ class Method:
     check_prior : PriorError unless it can work with that prior, before any work is done
     describe_weights : reads what a file of weights says of its training; None for a method that
         is not trained. Errors: WeightsError
+    try_masks : which stored objects lie in each of other masks, without their shapes; None for a
+        method that weighs no placements
     object_by_object : whether it does no work for ids that `Setup.only` leaves out
     gives_shapes : whether it reconstructs, or is there to be measured alone
     """
@@ -113,6 +121,7 @@ class Method:
     check_prior: Callable[[Prior, Any], None] | None = None
     describe_weights: Callable[[Path], dict[str, Any]] | None = None
     uses_cuda: bool = False
+    try_masks: Callable[[Frame, Setup, Trial], list[ObjectReconstruction]] | None = None
     object_by_object: bool = False
     gives_shapes: bool = True
 

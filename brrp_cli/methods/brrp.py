@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import logging
 import time
 from functools import partial
 from typing import TYPE_CHECKING
 
 from brrp_cli.config import PRESETS, Config
-from brrp_cli.methods.base import Method, Setup
+from brrp_cli.methods.base import Method, Setup, Trial
 from brrp_cli.methods.configuration import as_record
 
 if TYPE_CHECKING:
@@ -43,10 +42,8 @@ def run(frame: Frame, setup: Setup) -> Reconstruction:
     start = time.perf_counter()
     given = frame
     if config.hypotheses is not None:
-        frame = without_strays(frame, config.strays, setup.only if setup.trial is None else ())
-    # Of a trial nothing is inferred, from samples or otherwise.
-    samples = setup.trial is None or config.hypotheses is None
-    scene = observe(frame, config.observation, seed, workers, samples=samples)
+        frame = without_strays(frame, config.strays, setup.only)
+    scene = observe(frame, config.observation, seed, workers)
     if config.hypotheses is not None:
         wave = wave_deviation(frame, scene.plane, config.hypotheses.sensor)
         noise = pixel_noise(frame, scene.plane, config.hypotheses.sensor)
@@ -58,7 +55,7 @@ def run(frame: Frame, setup: Setup) -> Reconstruction:
                 frame, observation, prior, retriever, config, seed=seed, device=device
             )
         earlier = None
-        if setup.stream is not None and setup.trial is None:
+        if setup.stream is not None:
             earlier = EarlierViews.of(
                 setup.stream.earlier.get(observation.object_id, ()), setup.stream.config
             )
@@ -74,15 +71,12 @@ def run(frame: Frame, setup: Setup) -> Reconstruction:
             seed=seed,
             device=device,
             earlier=earlier,
-            trial=setup.trial,
         )
 
     def whole(object_id: int) -> ObjectReconstruction:
         if object_id in scene.too_few:
             return too_few(object_id, scene.too_few[object_id], config.observation.min_points)
-        infer = partial(one, scene.objects[object_id])
-        level = logging.WARNING if setup.trial is None else logging.DEBUG
-        return with_surface(object_id, infer, config.surface, level)
+        return with_surface(object_id, partial(one, scene.objects[object_id]), config.surface)
 
     ids = [i for i in frame.object_ids if setup.only is None or i in setup.only]
     return Reconstruction(
@@ -114,6 +108,12 @@ def _check_prior(prior: Prior, config: Config) -> None:
     check_prior(prior, config)
 
 
+def _try_masks(frame: Frame, setup: Setup, trial: Trial) -> list[ObjectReconstruction]:
+    from brrp_cli.methods.brrp_trial import try_masks
+
+    return try_masks(frame, setup, trial)
+
+
 METHOD = Method(
     name="brrp",
     summary="retrieval, registration and inference with a prior of known objects",
@@ -123,6 +123,7 @@ METHOD = Method(
     uses_prior=True,
     uses_retriever=True,
     check_prior=_check_prior,
+    try_masks=_try_masks,
     uses_cuda=True,
     object_by_object=True,
 )

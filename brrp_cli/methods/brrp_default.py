@@ -67,7 +67,13 @@ def reconstruct_by_hypotheses(
     assert config.hypotheses is not None
     hypotheses = counted_once(config.hypotheses, knows_depth(retriever))
     if trial is not None:
-        short = replace(hypotheses.search, unpromising=trial.unpromising, hopeless=trial.hopeless)
+        short = replace(
+            hypotheses.search,
+            unpromising=trial.unpromising,
+            hopeless=trial.hopeless,
+            # How it is turned is of no matter yet.
+            colour=replace(hypotheses.search.colour, asked=False),
+        )
         hypotheses = replace(hypotheses, search=short)
     seconds: dict[str, float] = {}
     object_id = observation.object_id
@@ -85,6 +91,8 @@ def reconstruct_by_hypotheses(
         probabilities = views.probabilities(seen_now)
         count = config.k if trial is None else min(config.k, trial.objects)
         chosen = top_k(probabilities, prior.names, count)
+        if trial is not None:
+            chosen = [each for each in chosen if each[1] >= trial.likely * chosen[0][1]]
         chosen += [
             (name, float(probabilities[prior.names.index(name)]))
             for name in begun

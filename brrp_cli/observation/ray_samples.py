@@ -52,15 +52,10 @@ class SceneObservation:
 
 
 def observe(
-    frame: Frame,
-    config: ObservationConfig,
-    seed: int,
-    workers: int = 1,
-    *,
-    samples: bool = True,
+    frame: Frame, config: ObservationConfig, seed: int, workers: int = 1
 ) -> SceneObservation:
-    """Sample the frame around each of its objects; without `samples`, give their points alone. The
-    same seed gives the same bytes, whatever the number of `workers`, objects at a time."""
+    """Sample the frame around each of its objects. The same seed gives the same bytes, whatever the
+    number of `workers`, objects at a time."""
     points = {i: frame.object_points(i) for i in frame.object_ids}
     too_few = {i: len(p) for i, p in points.items() if len(p) < config.min_points}
     centers = {i: box_center(p) for i, p in points.items() if i not in too_few}
@@ -71,10 +66,6 @@ def observe(
     if plane is None:
         log.warning("No support plane near the objects: nothing is sampled below one")
 
-    if not samples:
-        none = np.zeros((0, 3), np.float32), np.zeros(0, np.bool_)
-        seen = {i: ObjectObservation(i, points[i], center, *none) for i, center in centers.items()}
-        return SceneObservation(plane, seen, too_few)
     rays = ray_samples(frame.points[frame.valid], np.array(list(centers.values())), config, seed)
     surfaces = {i: grid_subsample(p, config.surface_cell) for i, p in points.items()}
 
@@ -103,6 +94,13 @@ def observe(
 
     objects = dict(zip(centers, in_threads(sample, list(centers), workers), strict=True))
     return SceneObservation(plane=plane, objects=objects, too_few=too_few)
+
+
+def without_samples(frame: Frame, object_id: int) -> ObjectObservation:
+    """The points of one object, of which there are some, and no samples."""
+    points = frame.object_points(object_id)
+    none = np.zeros((0, 3), np.float32), np.zeros(0, np.bool_)
+    return ObjectObservation(object_id, points, box_center(points), *none)
 
 
 @kept_for_last_frame

@@ -22,11 +22,17 @@ log = logging.getLogger(__name__)
 _clean: tuple[weakref.ref[Frame], StrayConfig] | None = None
 
 
-def without_strays(frame: Frame, config: StrayConfig, told: Collection[int] | None = None) -> Frame:
+def without_strays(
+    frame: Frame,
+    config: StrayConfig,
+    told: Collection[int] | None = None,
+    looked_at: Collection[int] | None = None,
+) -> Frame:
     """The frame, with no depth at pixels that their mask holds by mistake; the frame itself where
     there are none.
 
-    told : the objects of which the log tells; None = all
+    told : ids of the objects of which the log tells; looked_at : of those that may have strays;
+    None = all
 
     Masks that are a pixel too wide hold what stands behind the object, and cameras mix the depths
     of both. One such pixel moves the middle of the object's bounding box by half its distance.
@@ -36,7 +42,7 @@ def without_strays(frame: Frame, config: StrayConfig, told: Collection[int] | No
     if known is not None and known[0]() is frame and known[1] == config:
         return frame
     stray = np.zeros(frame.shape, dtype=bool)
-    for object_id in frame.object_ids:
+    for object_id in frame.object_ids if looked_at is None else looked_at:
         own = frame.valid & (frame.segmap == object_id)
         if own.any():
             rows, columns = np.nonzero(own)

@@ -137,7 +137,7 @@ def by_colour(
     image in colour, it takes its place, and those that are turned otherwise go."""
     best = found[0]
     model, colour = best.model, config.colour
-    if not model.stored.record.get("coloured"):
+    if not colour.asked or not model.stored.record.get("coloured"):
         return found
     turns = turns_about_itself(colour.turns)
     T = best.T_cam_model @ as_transforms(turns)

@@ -45,9 +45,10 @@ def judged(
     """
     likelihood = config.likelihood
     best = max((each.alignment_score for each in placed), default=-np.inf)
+    least = max(best - likelihood.within, likelihood.least_alignment)
 
     def ratio(each: Hypothesis) -> float:
-        if each.alignment_score < best - likelihood.within:
+        if each.alignment_score < least:
             return -np.inf
         found = evidence(each.T_cam_model, each.model, seen, likelihood, config.search.colour)
         resized = abs(np.log(each.scale)) > config.search.least_size_change

@@ -63,8 +63,10 @@ class AppearanceRetriever:
         self._sensor = hypotheses.sensor
         self._frame: Frame | None = None
         self._answers: dict[int, NDArray[np.float64]] = {}
-        # What was seen of a mask of the present image, by the mask's bytes.
-        self._seen: dict[bytes, Similarity] | None = None
+        self._hasty = False
+        # What was seen of a mask of the present image, by its bytes and whether that was in haste.
+        self._seen: dict[tuple[bytes, bool], Similarity] | None = None
+        self._plane: Plane | None = None
 
     @contextmanager
     def one_image(self) -> Iterator[None]:
@@ -73,12 +75,22 @@ class AppearanceRetriever:
         try:
             yield
         finally:
-            self._seen = self._frame = None
+            self._seen = self._frame = self._plane = None
+
+    @contextmanager
+    def hasty(self) -> Iterator[None]:
+        """See retrieval/base.py."""
+        self._hasty = True
+        try:
+            yield
+        finally:
+            self._hasty, self._frame = False, None
 
     def probabilities(self, frame: Frame, object_id: int) -> NDArray[np.float64]:
         """P(c|R) (n,) for one object of the frame, in the order of the prior's names; sum <= 1."""
         if frame is not self._frame:
-            found = self.evidence(frame)
+            # Of masks that are tried, only the one that is asked about is looked at.
+            found = self.evidence(frame, [object_id] if self._hasty else None)
             own = self._config.retrieval
             weights = own.fusion if self.aligns else own.likeness
             answers = self._believe(list(found.values()), weights)
@@ -93,15 +105,23 @@ class AppearanceRetriever:
             )
         return self._answers[object_id]
 
-    def evidence(self, frame: Frame) -> dict[int, Similarity]:
-        """How alike every object of the frame is to the stored ones, by id."""
+    def evidence(self, frame: Frame, asked: Sequence[int] | None = None) -> dict[int, Similarity]:
+        """How alike every object of the frame is to the stored ones, by id; with `asked`, these and
+        those that are known."""
+        known = {} if self._seen is None else self._seen
         masks = {i: np.packbits(frame.segmap == i).tobytes() for i in frame.object_ids}
-        known = self._seen or {}
-        new = [i for i, mask in masks.items() if mask not in known]
-        found = self._compared(frame, new)
-        if self._seen is not None:
-            self._seen |= {masks[i]: found[i] for i in new}
-        return {i: found[i] if i in found else known[mask] for i, mask in masks.items()}
+        # What was looked at at leisure is known in haste, too.
+        found = {
+            i: known[mask, hasty]
+            for hasty in ((True, False) if self._hasty else (False,))
+            for i, mask in masks.items()
+            if (mask, hasty) in known
+        }
+        new = [i for i in masks if i not in found and (asked is None or i in asked)]
+        looked = self._compared(frame, new)
+        known.update({(masks[i], self._hasty): seen for i, seen in looked.items()})
+        found |= looked
+        return {i: found[i] for i in masks if i in found}
 
     def _compared(self, frame: Frame, ids: Sequence[int]) -> dict[int, Similarity]:
         # Methods that leave strays out, and those that do not, get the same answer.
@@ -147,7 +167,8 @@ class AppearanceRetriever:
         shuffled = points[np.random.default_rng(self._seed).permutation(len(points))]
         seen = self._aligner.on(shuffled, frame, plane, wave)
         alignment = np.full(len(look.rows), own.unaligned, np.float32)
-        for begin in range(0, own.rounds * own.tried, own.tried):
+        rounds = min(own.hasty_rounds, own.rounds) if self._hasty else own.rounds
+        for begin in range(0, rounds * own.tried, own.tried):
             # In the prior's order, in which shards hold them.
             tried = np.sort(np.concatenate([kind[begin : begin + own.tried] for kind in ranked]))
             first = seen.first_scores(self._named(look.rows[tried]))
@@ -184,4 +205,8 @@ class AppearanceRetriever:
 
     def plane(self, frame: Frame) -> Plane | None:
         """The support plane of the frame; None where none is found."""
-        return scene_plane(frame, self._config.observation, self._seed)
+        if self._seen is None:
+            return scene_plane(frame, self._config.observation, self._seed)
+        if self._plane is None:
+            self._plane = scene_plane(frame, self._config.observation, self._seed)
+        return self._plane

@@ -47,8 +47,15 @@ def one_image(retriever: Retriever | None) -> Iterator[None]:
     """While this lasts, all frames are one image with one mask or another. A retriever may give
     what it saw of a mask again, though what else is masked changes it a little: it has a method
     `one_image` then."""
-    begin = getattr(retriever, "one_image", nullcontext)
-    with begin():
+    with getattr(retriever, "one_image", nullcontext)():
+        yield
+
+
+@contextmanager
+def hasty(retriever: Retriever) -> Iterator[None]:
+    """While this lasts, a retriever may look at fewer objects: most masks that are tried are no
+    object. It has a method `hasty` then."""
+    with getattr(retriever, "hasty", nullcontext)():
         yield
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brrp_cli.frames.frame import Frame
-from brrp_cli.retrieval.base import Retriever, knows_depth, one_image, unknown
+from brrp_cli.retrieval.base import Retriever, hasty, knows_depth, one_image, unknown
 
 
 class BothRetriever:
@@ -35,6 +35,12 @@ class BothRetriever:
     def one_image(self) -> Iterator[None]:
         """See retrieval/base.py."""
         with one_image(self._first), one_image(self._second):
+            yield
+
+    @contextmanager
+    def hasty(self) -> Iterator[None]:
+        """See retrieval/base.py."""
+        with hasty(self._first), hasty(self._second):
             yield
 
     def probabilities(self, frame: Frame, object_id: int) -> NDArray[np.float64]:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import count
+from itertools import count, product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from brrp_cli.config.segmentation import RegroupConfig, SegmentConfig
 from brrp_cli.dependencies import import_library
 from brrp_cli.frames.frame import BACKGROUND, Frame
+from brrp_cli.seeds import child_rng
 from brrp_cli.segmentation.cut import boundary_of, cut_at_strongest, filled
 
 Mask = NDArray[np.bool_]
@@ -30,17 +31,26 @@ class OtherMask:
 
 
 def other_masks(
-    frame: Frame, ids: Sequence[int], aside: NDArray[np.integer] | None, config: SegmentConfig
+    frame: Frame,
+    ids: Sequence[int],
+    aside: NDArray[np.integer] | None,
+    config: SegmentConfig,
+    seed: int = 0,
 ) -> list[OtherMask]:
     """Masks of what was left out, `aside` (H, W); unions of the masks `ids` with their neighbours,
-    all of them and two by two; and halves of each. `config.regroup.most` of them at most."""
+    all of them and two by two; and parts of each, by its inner boundary and by colour.
+    `config.regroup.most` of them at most."""
     own = config.regroup
     found = [] if aside is None else _left_out(frame, aside)
     found += [OtherMask(np.isin(frame.segmap, list(of)), of) for of in unions(frame, ids, own)]
-    if any(_size(frame, frame.segmap == i) >= own.least_cut for i in ids):
+    large = [i for i in ids if _size(frame, frame.segmap == i) >= own.least_cut]
+    if large:
         boundary = boundary_of(frame, config)
-        for i in ids:
-            found += _halves(frame, i, boundary, config)
+        for i in large:
+            rng = child_rng(seed, "colour groups", i)
+            found += [
+                OtherMask(part, frozenset([i])) for part in parts(frame, i, boundary, config, rng)
+            ]
     return [each for each in found if _size(frame, each.mask) >= own.least_pixels][: own.most]
 
 
@@ -54,20 +64,6 @@ def unions(frame: Frame, ids: Sequence[int], config: RegroupConfig) -> list[froz
         groups.update(dict.fromkeys(whole, whole))
     every = [group for group in dict.fromkeys(groups.values()) if len(group) > 1]
     return every + [pair for pair in pairs if pair not in every]
-
-
-def in_turns(masks: Sequence[OtherMask]) -> list[list[OtherMask]]:
-    """The masks in lists of such as do not overlap: each list is one map of masks."""
-    turns: list[tuple[Mask, list[OtherMask]]] = []
-    for each in masks:
-        for taken, turn in turns:
-            if not (taken & each.mask).any():
-                taken |= each.mask
-                turn.append(each)
-                break
-        else:
-            turns.append((each.mask.copy(), [each]))
-    return [turn for _, turn in turns]
 
 
 def painted(
@@ -125,19 +121,80 @@ def _boxes(
     return found
 
 
-def _halves(
-    frame: Frame, object_id: int, boundary: NDArray[np.float64], config: SegmentConfig
-) -> list[OtherMask]:
-    mask = frame.segmap == object_id
-    if _size(frame, mask) < config.regroup.least_cut:
-        return []
-    parts = cut_at_strongest(mask & frame.valid, boundary, 2, config)
-    if parts is None:
-        return []
-    whole = filled(mask, parts)
-    return [
-        OtherMask(whole == label, frozenset([object_id])) for label in np.unique(whole[whole > 0])
-    ]
+def parts(
+    frame: Frame,
+    object_id: int,
+    boundary: NDArray[np.float64],
+    config: SegmentConfig,
+    rng: np.random.Generator,
+) -> list[Mask]:
+    """What may be an object of its own in one mask: halves on both sides of its strongest boundary
+    (H, W), and what hangs together in colour. Parts that are nearly alike come once."""
+    own = config.regroup
+    ((_, rows, columns),) = _boxes(frame.segmap, [object_id], 1)
+    window = (rows, columns)
+    mask, seen = frame.segmap[window] == object_id, frame.valid[window]
+    cut = cut_at_strongest(mask & seen, boundary[window], 2, config)
+    pieces = [] if cut is None else _pieces(filled(mask, cut), mask)
+    lab = _smooth_colours(frame.rgb[window], mask, own)
+    for labels in colour_groups(lab, mask, own, rng):
+        pieces += [
+            each
+            for each in _pieces(labels, mask)
+            if np.linalg.norm(lab[each].mean(axis=0) - lab[mask & ~each].mean(axis=0)) > own.differs
+        ]
+    found: list[Mask] = []
+    for piece in pieces:
+        alike = own.same * piece.sum()
+        if (piece & seen).sum() >= own.least_pixels and not any(
+            (piece ^ other).sum() < alike for other in [mask, *found]
+        ):
+            found.append(piece)
+    whole = [np.zeros(frame.shape, np.bool_) for _ in found]
+    for each, part in zip(whole, found, strict=True):
+        each[window] = part
+    return whole
+
+
+def _smooth_colours(
+    rgb: NDArray[np.uint8], mask: Mask, config: RegroupConfig
+) -> NDArray[np.float64]:
+    """L*a*b* (h, w, 3) with L* of less weight, averaged over near pixels of the mask; 0 outside."""
+    ndimage = import_library("scipy.ndimage")
+    lab = import_library("skimage.color").rgb2lab(rgb) * [config.lightness, 1, 1]
+    around = (config.blur, config.blur, 0)
+    weight = ndimage.gaussian_filter(mask.astype(np.float64), config.blur)
+    smooth = ndimage.gaussian_filter(np.where(mask[..., None], lab, 0.0), around)
+    return np.where(mask[..., None], smooth / np.maximum(weight, 1e-6)[..., None], 0.0)
+
+
+def colour_groups(
+    lab: NDArray[np.float64], mask: Mask, config: RegroupConfig, rng: np.random.Generator
+) -> list[NDArray[np.int64]]:
+    """Labels (h, w) of a mask's pixels by k-means in colour and place, 0 outside it: of each number
+    of groups and each weight of places. lab : (h, w, 3)"""
+    vq = import_library("scipy.cluster.vq")
+    places = np.argwhere(mask)
+    drawn = rng.permutation(len(places))[: config.samples]
+    groups = []
+    for many, place in product(config.colours, config.places):
+        features = np.column_stack([lab[mask], place * places])
+        seed = int(rng.integers(2**31))
+        middles, _ = vq.kmeans2(features[drawn], many, minit="++", seed=seed)
+        labels = np.zeros(mask.shape, np.int64)
+        labels[mask] = vq.vq(features, middles)[0] + 1
+        groups.append(labels)
+    return groups
+
+
+def _pieces(labels: NDArray[np.int64], mask: Mask) -> list[Mask]:
+    """What hangs together of each label, without bridges of a pixel or two, and with its holes."""
+    ndimage = import_library("scipy.ndimage")
+    found = []
+    for label in np.unique(labels[labels > 0]):
+        each, many = ndimage.label(ndimage.binary_opening(labels == label))
+        found += [ndimage.binary_fill_holes(each == i) & mask for i in range(1, many + 1)]
+    return found
 
 
 def _size(frame: Frame, mask: Mask) -> int:

@@ -10,6 +10,7 @@ from table_scene import T_CAM_WORLD, TABLE, in_camera, photograph
 
 from brrp_cli.config.segmentation import MendConfig, SegmentConfig
 from brrp_cli.geometry import similarity
+from brrp_cli.mending.again import Again
 from brrp_cli.mending.claim import mended_masks
 from brrp_cli.mending.explain import rendered
 from brrp_cli.mending.mend import mend
@@ -74,11 +75,11 @@ def test_what_changed_is_reconstructed_again_and_nothing_else(prior):
     first = reconstruction(frame, objects)
     asked = []
 
-    def again(frame, only, *, trial=None):
-        assert trial is None
+    def infer(frame, only):
         asked.append(([*frame.object_ids], [*only]))
         return reconstruction(frame, [ObjectReconstruction(1, OK, n_points=5)])
 
+    again = Again(infer, pytest.fail)
     result = mend(first, prior, again, SegmentConfig())
     assert asked == [([1, 2], [1])]
     assert [item.n_points for item in result.objects] == [5, objects[1].n_points]

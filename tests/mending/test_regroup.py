@@ -10,14 +10,19 @@ import pytest
 from painted_scene import STRANGE, THINGS, photograph, write_things
 
 from brrp_cli import Reconstructor
-from brrp_cli.api import reconstruct
+from brrp_cli.api import reconstruct, try_masks
+from brrp_cli.config import preset
 from brrp_cli.config.registration import TrialConfig
 from brrp_cli.config.segmentation import RegroupConfig, SegmentConfig
+from brrp_cli.errors import BrrpError
+from brrp_cli.mending.again import Again
 from brrp_cli.mending.mend import mend
 from brrp_cli.mending.regroup import regroup
 from brrp_cli.prior.build.build import build_prior
 from brrp_cli.prior.parameters import BuildParameters
 from brrp_cli.prior.store import open_prior
+from brrp_cli.reconstruction import TOO_FEW_POINTS
+from brrp_cli.retrieval.appearance import AppearanceRetriever
 
 # The can and the ball share a mask, the box comes in two, the plate was left out.
 PLACES = {"red_box": (-0.16, 0.06), "red_can": (0.1, 0.08), "yellow_ball": (0.1, -0.05)}
@@ -58,20 +63,27 @@ def aside(truth):
 
 
 @pytest.fixture(scope="module")
-def run(prior):
-    return partial(reconstruct, prior=prior, retriever="appearance", workers=1)
+def given(prior):
+    # One retriever, as in a command: what it saw of a mask counts for all frames of the image.
+    config = preset("default")
+    retriever = AppearanceRetriever(prior, config, 0)
+    return {"prior": prior, "config": config, "retriever": retriever, "workers": 1}
 
 
 @pytest.fixture(scope="module")
-def first(run, frame):
-    return run(frame)
+def again(given):
+    return Again(
+        lambda frame, only: reconstruct(frame, only=only, **given), partial(try_masks, **given)
+    )
 
 
 @pytest.fixture(scope="module")
-def mended(first, prior, run, aside):
-    def again(frame, only, /, *, trial=None):
-        return run(frame, only=only, trial=trial)
+def first(given, frame):
+    return reconstruct(frame, **given)
 
+
+@pytest.fixture(scope="module")
+def mended(first, prior, again, aside):
     return mend(first, prior, again, SegmentConfig(), aside)
 
 
@@ -96,30 +108,45 @@ def test_what_is_regrouped_has_a_mesh_and_what_stayed_is_what_it_was(first, mend
     assert stranger is kept[STRANGE_ID] and stranger.recognised is None
 
 
-def test_a_trial_tells_what_a_reconstruction_does_and_infers_nothing(run, truth):
-    frame = replace(truth, segmap=np.where(truth.segmap < 4, truth.segmap, 0))
-    whole, tried = run(frame), run(frame, trial=TrialConfig())
-    assert taken_for(tried) == taken_for(whole) and len(taken_for(tried)) == 3
-    assert all(item.surface is None and item.posterior is None for item in tried.objects)
+def test_a_trial_tells_what_a_reconstruction_does_and_infers_nothing(given, truth):
+    masks = [truth.segmap == i for i in (1, 2, 3, STRANGE_ID)]
+    bare = replace(truth, segmap=np.zeros_like(truth.segmap))
+    tried = try_masks(bare, masks, TrialConfig(), **given)
+    assert [item.outcome.name for item in tried] == [*PLACES, None]
+    assert [item.object_id for item in tried] == [0, 1, 2, 3]
+    assert all(item.surface is None and item.posterior is None for item in tried)
+    two = try_masks(bare, masks, TrialConfig(), **{**given, "workers": 2})
+    assert [item.unknown_weight for item in two] == [item.unknown_weight for item in tried]
+
+
+def test_a_mask_without_depth_and_a_method_without_weights_are_told(given, truth):
+    nothing = np.zeros(truth.shape, np.bool_)
+    (item,) = try_masks(truth, [nothing], TrialConfig(), **given)
+    assert item.status == TOO_FEW_POINTS and item.recognised is None
+    with pytest.raises(BrrpError, match="weighs no placements"):
+        try_masks(truth, [nothing], TrialConfig(), method="vprism")
 
 
 def test_nothing_is_tried_where_no_try_is_allowed(first, prior, aside):
-    never = SegmentConfig(regroup=RegroupConfig(most=0))
-    assert regroup(first, prior, pytest.fail, never, aside) is first
-    nobody = [replace(item, unknown_weight=None) for item in first.objects]
-    unweighed = replace(first, objects=nobody)
-    assert regroup(unweighed, prior, pytest.fail, SegmentConfig(), aside) is unweighed
+    nobody = Again(pytest.fail, pytest.fail)
+    for never in (RegroupConfig(rounds=0), RegroupConfig(most=0)):
+        assert regroup(first, prior, nobody, SegmentConfig(regroup=never), aside) is first
+    unweighed = replace(
+        first, objects=[replace(item, unknown_weight=None) for item in first.objects]
+    )
+    assert regroup(unweighed, prior, nobody, SegmentConfig(), aside) is unweighed
 
 
-def test_only_masks_that_are_asked_about_are_tried(first, prior, run):
+def test_only_masks_that_are_asked_about_are_tried(first, prior, again, frame):
     tried = []
 
-    def again(frame, only, /, *, trial=None):
-        tried.extend(only)
-        return run(frame, only=only, trial=trial)
+    def masks(frame, masks, trial):
+        tried.extend(masks)
+        return again.masks(frame, masks, trial)
 
-    assert regroup(first, prior, again, SegmentConfig(), None, [STRANGE_ID]) is first
-    assert not tried
+    spied = Again(pytest.fail, masks)
+    assert regroup(first, prior, spied, SegmentConfig(), None, [STRANGE_ID]) is first
+    assert not any((mask & (frame.segmap != STRANGE_ID)).any() for mask in tried)
 
 
 def test_a_session_regroups_the_masks_that_it_makes(prior, truth):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from table_scene import MESHES, TABLE, in_camera, photograph, placed, stored
@@ -65,6 +67,17 @@ def test_what_cannot_win_is_not_refined(frame):
     placements, ratios = judge(frame, given)
     assert ratios[1] < CONFIG.likelihood.refined_from
     assert placements[1] is given[1]
+
+
+@pytest.mark.parametrize("score", [0.24, 0.39])
+def test_what_hardly_lies_on_what_is_seen_has_no_weight(frame, score):
+    """Alone, or behind another one by more than `within`."""
+    poor = replace(off("box", 0.0), alignment_score=score)
+    given = [poor] if score < CONFIG.likelihood.least_alignment else [off("box", 0.0), poor]
+    _, ratios = judge(frame, given)
+    assert ratios[-1] == -np.inf
+    _, (enough,) = judge(frame, [replace(poor, alignment_score=0.26)])
+    assert enough > 0
 
 
 def test_depth_counts_less_where_retrieval_knows_it():

@@ -14,7 +14,7 @@ from brrp_cli.registration.model import search_model
 from brrp_cli.retrieval import appearance
 from brrp_cli.retrieval.aligned import PARTS, bare_model
 from brrp_cli.retrieval.appearance import AppearanceRetriever
-from brrp_cli.retrieval.base import one_image, unknown
+from brrp_cli.retrieval.base import hasty, one_image, unknown
 
 PLACES = {3: (-0.15, 0.1), 4: (0.12, 0.14), 8: (0.0, -0.02), 9: (0.2, -0.1), 11: (-0.2, -0.14)}
 STRANGER = 20
@@ -143,6 +143,24 @@ def test_more_objects_are_tried_until_one_lies_well(prior):
     until = aligned(rounds=5, certain=0.85)
     assert until[STRANGER] > max(until[i] for i in names) == 1
     assert min(aligned(rounds=5, certain=1.0).values()) > 1
+
+
+def test_in_haste_fewer_objects_are_tried_and_what_is_known_is_used(prior):
+    frame, _ = scene()
+    aligner = retriever_of(prior, True, tried=1, margin=100.0, unaligned=0.1, certain=1.0, rounds=5)
+
+    def tried():
+        return int((aligner.evidence(frame)[STRANGER].alignment > 0.1).sum())
+
+    with hasty(aligner):
+        assert tried() == 1
+    with one_image(aligner):
+        with hasty(aligner):
+            assert tried() == 1
+        every = tried()
+        assert every > 1
+        with hasty(aligner):
+            assert tried() == every
 
 
 def test_colours_that_say_nothing_leave_it_to_alignment(prior, aligner):

@@ -11,7 +11,7 @@ from table_scene import K, in_camera, photograph, placed
 from brrp_cli.config.segmentation import RegroupConfig, SegmentConfig
 from brrp_cli.frames.frame import Frame
 from brrp_cli.geometry import backproject
-from brrp_cli.segmentation.other_masks import OtherMask, in_turns, other_masks, painted, unions
+from brrp_cli.segmentation.other_masks import OtherMask, other_masks, painted, unions
 from brrp_cli.shapes import solids
 
 CONFIG = RegroupConfig()
@@ -53,13 +53,13 @@ def test_two_things_in_one_mask_are_its_halves():
     )
     truth = photograph({1: first, 2: second})
     frame = replace(truth, segmap=np.where(truth.segmap > 0, 7, 0))
-    halves = other_masks(frame, [7], None, SegmentConfig())
-    assert [each.of for each in halves] == [{7}, {7}]
+    depth_alone = SegmentConfig(regroup=replace(CONFIG, colours=()))
+    halves = other_masks(frame, [7], None, depth_alone)
+    assert len(halves) == 2
+    assert {each.of for each in halves} == {frozenset([7])}
     for object_id in (1, 2):
         mask = truth.segmap == object_id
         assert max((each.mask & mask).sum() / (each.mask | mask).sum() for each in halves) > 0.95
-    alone = replace(truth, segmap=np.where(truth.segmap == 1, 1, 0))
-    assert other_masks(alone, [1], None, SegmentConfig()) == []
 
 
 def test_what_was_left_out_is_tried_where_nothing_else_is():
@@ -76,16 +76,33 @@ def test_there_are_no_more_tries_than_allowed():
     assert len(other_masks(frame, [1, 2, 3], None, config)) == 2
 
 
-def test_masks_of_one_turn_do_not_overlap_and_none_is_lost():
+def test_parts_of_two_colours_are_found_where_depth_is_flat():
     frame = row_of_masks()
-    groups = unions(frame, [1, 2, 3], CONFIG)
-    masks = [OtherMask(np.isin(frame.segmap, list(of)), of) for of in groups]
-    masks.append(OtherMask(frame.segmap == 1, frozenset([1])))
-    turns = in_turns(masks)
-    assert [len(turn) for turn in turns] == [1, 1, 2]
-    assert sorted(map(id, masks)) == sorted(id(each) for turn in turns for each in turn)
-    for turn in turns:
-        assert (sum(each.mask.astype(int) for each in turn) <= 1).all()
+    rgb = np.where((np.arange(120) < 40)[None, :, None], [200, 40, 40], [40, 60, 180])
+    noise = np.random.default_rng(0).normal(0, 12, (80, 120, 3))
+    segmap = np.where(np.isin(frame.segmap, [1, 2]), 1, 0)
+    rgb = np.clip(rgb + noise, 0, 255).astype(np.uint8)
+    two = replace(frame, rgb=rgb, segmap=segmap)
+    found = other_masks(two, [1], None, SegmentConfig())
+    for true_id in (1, 2):
+        mask = frame.segmap == true_id
+        assert max((each.mask & mask).sum() / (each.mask | mask).sum() for each in found) > 0.95
+    again = other_masks(two, [1], None, SegmentConfig())
+    assert all((a.mask == b.mask).all() for a, b in zip(found, again, strict=True))
+
+
+def test_parts_lie_in_their_mask_are_large_enough_and_come_once():
+    frame = row_of_masks()
+    rng = np.random.default_rng(1)
+    rgb = rng.integers(0, 255, (8, 12, 3)).repeat(10, axis=0).repeat(10, axis=1).astype(np.uint8)
+    whole = replace(frame, rgb=rgb, segmap=np.minimum(frame.segmap, 1))
+    found = other_masks(whole, [1], None, SegmentConfig())
+    assert len(found) > 2
+    for i, each in enumerate(found):
+        assert not (each.mask & (whole.segmap != 1)).any()
+        assert each.mask.sum() >= CONFIG.least_pixels
+        for other in [*found[:i], OtherMask(whole.segmap == 1, frozenset())]:
+            assert (each.mask ^ other.mask).sum() >= CONFIG.same * each.mask.sum()
 
 
 def test_a_union_has_its_lowest_id_and_a_part_a_new_one():
