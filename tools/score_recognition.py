@@ -38,6 +38,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from brrp_cli.config.segmentation import SegmentConfig
 from brrp_cli.dependencies import import_open3d
 from brrp_cli.errors import BrrpError
+from brrp_cli.evaluation.bootstrap import mean_interval
 from brrp_cli.frames.frame import Frame
 from brrp_cli.geometry import transform_points
 from brrp_cli.ground_truth.scenes import Scene, find_scenes, true_mesh_in_camera
@@ -176,6 +177,16 @@ def _distance(
     return float(raycasting_scene([mesh]).compute_distance(query).numpy().mean())
 
 
+def share_of(objects: list[Row]) -> str:
+    """The share of recognised objects, with its 95 % interval over scenes."""
+    if not objects:
+        return ""
+    scenes = [f"{row.get('set', '')}/{row['scene']}" for row in objects]
+    recognised = [float(row["recognised"]) for row in objects]
+    found = mean_interval(recognised, scenes, np.random.default_rng(0))
+    return f" ({100 * found.value:.0f} % [{100 * found.low:.0f}, {100 * found.high:.0f}])"
+
+
 def report(name: str, rows: list[Row]) -> str:
     """Lines of one set: all, and by cause."""
     objects = [row for row in rows if "object" in row]
@@ -184,8 +195,7 @@ def report(name: str, rows: list[Row]) -> str:
     found = [row for row in objects if row["recognised"]]
     near = 1000 * np.mean([row["distance"] for row in found]) if found else np.nan
     lines = [
-        f"{name}: {len(found)} of {len(objects)} recognised"
-        f" ({100 * len(found) / max(len(objects), 1):.0f} %), {near:.1f} mm;"
+        f"{name}: {len(found)} of {len(objects)} recognised{share_of(objects)}, {near:.1f} mm;"
         f" {len(wrong)} of {masks} masks wrong"
     ]
     for why in CAUSES:

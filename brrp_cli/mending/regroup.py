@@ -70,7 +70,9 @@ def _one_round(
         for each in result.objects
         if (asked is None or each.object_id in asked) and not _recognised(each, own)
     ]
-    masks = other_masks(frame, doubtful, aside, config, result.seed)
+    # What has the shape of a stored object, stretched, is one thing.
+    whole = [each.object_id for each in result.objects if each.like is not None]
+    masks = other_masks(frame, doubtful, aside, config, result.seed, whole)
     found: list[_Found] = []
     tried = again.masks(frame, [each.mask for each in masks], own.trial) if masks else []
     for mask, item in zip(masks, tried, strict=True):

@@ -6,7 +6,7 @@ one of these masks can.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from itertools import count, product
 
@@ -36,14 +36,18 @@ def other_masks(
     aside: NDArray[np.integer] | None,
     config: SegmentConfig,
     seed: int = 0,
+    whole: Collection[int] = (),
 ) -> list[OtherMask]:
     """Masks of what was left out, `aside` (H, W); unions of the masks `ids` with their neighbours,
     all of them and two by two; and parts of each, by its inner boundary and by colour.
-    `config.regroup.most` of them at most."""
+    `config.regroup.most` of them at most.
+
+    whole : ids of masks that are not cut
+    """
     own = config.regroup
     found = [] if aside is None else _left_out(frame, aside)
     found += [OtherMask(np.isin(frame.segmap, list(of)), of) for of in unions(frame, ids, own)]
-    large = [i for i in ids if _size(frame, frame.segmap == i) >= own.least_cut]
+    large = [i for i in ids if i not in whole and _size(frame, frame.segmap == i) >= own.least_cut]
     if large:
         boundary = boundary_of(frame, config)
         for i in large:

@@ -21,7 +21,7 @@ from brrp_cli.mending.regroup import regroup
 from brrp_cli.prior.build.build import build_prior
 from brrp_cli.prior.parameters import BuildParameters
 from brrp_cli.prior.store import open_prior
-from brrp_cli.reconstruction import TOO_FEW_POINTS
+from brrp_cli.reconstruction import TOO_FEW_POINTS, Similar
 from brrp_cli.retrieval.appearance import AppearanceRetriever
 
 # The can and the ball share a mask, the box comes in two, the plate was left out.
@@ -135,6 +135,26 @@ def test_nothing_is_tried_where_no_try_is_allowed(first, prior, aside):
         first, objects=[replace(item, unknown_weight=None) for item in first.objects]
     )
     assert regroup(unweighed, prior, nobody, SegmentConfig(), aside) is unweighed
+
+
+def test_what_a_stretched_object_explains_is_not_cut(first, prior, again):
+    """It may still be a part of something larger."""
+    tried = []
+
+    def masks(frame, masks, trial):
+        tried.append(masks)
+        return again.masks(frame, masks, trial)
+
+    spied = Again(again.objects, masks)
+    like = [
+        replace(item, similar=[Similar("red_can", 0.9, np.ones(3))])
+        if item.object_id == BOTH
+        else item
+        for item in first.objects
+    ]
+    regroup(first, prior, spied, SegmentConfig(), None, [BOTH])
+    regroup(replace(first, objects=like), prior, spied, SegmentConfig(), None, [BOTH])
+    assert len(tried) == 1 and tried[0]
 
 
 def test_only_masks_that_are_asked_about_are_tried(first, prior, again, frame):

@@ -87,8 +87,17 @@ def test_parts_of_two_colours_are_found_where_depth_is_flat():
     for true_id in (1, 2):
         mask = frame.segmap == true_id
         assert max((each.mask & mask).sum() / (each.mask | mask).sum() for each in found) > 0.95
+    assert other_masks(two, [1], None, SegmentConfig(), whole=[1]) == []
     again = other_masks(two, [1], None, SegmentConfig())
     assert all((a.mask == b.mask).all() for a, b in zip(found, again, strict=True))
+
+
+def test_what_is_of_one_colour_is_not_cut_by_colour():
+    frame = row_of_masks()
+    noise = np.random.default_rng(0).normal(0, 12, (80, 120, 3))
+    rgb = np.clip(noise + [180, 140, 90], 0, 255).astype(np.uint8)
+    plain = replace(frame, rgb=rgb, segmap=np.minimum(frame.segmap, 1))
+    assert other_masks(plain, [1], None, SegmentConfig()) == []
 
 
 def test_parts_lie_in_their_mask_are_large_enough_and_come_once():
