@@ -294,8 +294,9 @@ class RegroupConfig:
 
     rounds : times that this is done at most, of what the last one changed; 0 = never
     most : tries in a round at most
-    least_weight : of a stored object, from which on it is recognised in a mask that is tried;
-        explained : part of that mask that it explains as it was placed, at least
+    least_weight : of a stored object in a mask that is not regrouped; sure : in one that was tried,
+        to be taken; explained : part of that mask that it explains as it was placed, at least;
+        within : part of what it explains of all masks that lies in that one
     reach, gap : pixels and metres in depth within which masks are neighbours
     least_pixels : with depth, of a mask that is tried; least_cut : of one that is cut
     colours : numbers of groups of pixels that are alike in colour and place; places : what a pixel
@@ -309,7 +310,9 @@ class RegroupConfig:
     rounds: int = between(3, 0, 10)
     most: int = between(60, 0, 10_000)
     least_weight: float = share(0.8)
+    sure: float = share(0.95)
     explained: float = share(0.6)
+    within: float = share(0.5)
     reach: int = between(3, 1, 64)
     gap: float = 0.015
     least_pixels: int = 300

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -68,7 +69,7 @@ def _one_round(
     doubtful = [
         each.object_id
         for each in result.objects
-        if (asked is None or each.object_id in asked) and not _recognised(each, own)
+        if (asked is None or each.object_id in asked) and not _recognised(each, own.least_weight)
     ]
     # What has the shape of a stored object, stretched, is one thing.
     whole = [each.object_id for each in result.objects if each.like is not None]
@@ -76,12 +77,15 @@ def _one_round(
     found: list[_Found] = []
     tried = again.masks(frame, [each.mask for each in masks], own.trial) if masks else []
     for mask, item in zip(masks, tried, strict=True):
-        if not _recognised(item, own):
+        if not _recognised(item, own.sure):
             continue
         assert item.recognised is not None
         seen = mask.mask & frame.valid
-        pixels = explained(item.recognised, seen, prior, frame, config.mend)
-        if pixels >= own.explained * seen.sum():
+        explains = partial(explained, item.recognised, prior=prior, frame=frame, config=config.mend)
+        pixels = explains(seen)
+        # The print on a can looks like a smaller can, which would hide more of the can than that.
+        everywhere = explains(seen | (frame.valid & (frame.segmap != BACKGROUND)))
+        if pixels >= own.explained * seen.sum() and pixels >= own.within * everywhere:
             found.append(_Found(mask, pixels))
     chosen = _chosen(found)
     if not chosen:
@@ -92,9 +96,9 @@ def _one_round(
     return replaced(result, replace(frame, segmap=segmap), changed, again)
 
 
-def _recognised(item: ObjectReconstruction, config: RegroupConfig) -> bool:
+def _recognised(item: ObjectReconstruction, least_weight: float) -> bool:
     found = item.recognised
-    return found is not None and (found.weight or 0.0) >= config.least_weight
+    return found is not None and (found.weight or 0.0) >= least_weight
 
 
 def _chosen(found: Sequence[_Found]) -> list[OtherMask]:
