@@ -232,36 +232,25 @@ class Reconstructor:
         *,
         stream: Stream | None = None,
     ) -> Reconstruction:
-        return reconstruct(
-            frame,
-            self._prior,
-            method=self._method,
-            config=self._config,
-            retriever=self._retriever,
-            weights=self._weights,
-            seed=self._seed,
-            device=self._device,
-            workers=self._workers,
-            only=only,
-            stream=stream,
-        )
+        return reconstruct(frame, only=only, stream=stream, **self._given)
 
     def _tried(
         self, frame: Frame, masks: Sequence[NDArray[np.bool_]], trial: TrialConfig
     ) -> list[ObjectReconstruction]:
-        return try_masks(
-            frame,
-            masks,
-            trial,
-            self._prior,
-            method=self._method,
-            config=self._config,
-            retriever=self._retriever,
-            weights=self._weights,
-            seed=self._seed,
-            device=self._device,
-            workers=self._workers,
-        )
+        return try_masks(frame, masks, trial, **self._given)
+
+    @property
+    def _given(self) -> dict[str, Any]:
+        return {
+            "prior": self._prior,
+            "method": self._method,
+            "config": self._config,
+            "retriever": self._retriever,
+            "weights": self._weights,
+            "seed": self._seed,
+            "device": self._device,
+            "workers": self._workers,
+        }
 
     def stream(self, frames: Iterable[Frame]) -> Iterator[Reconstruction | FrameError]:
         """One answer for each frame: a frame that cannot be used gives its error and ends

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from brrp_cli.config.segmentation import MendConfig
+from brrp_cli.config.mending import MendConfig
 from brrp_cli.mending.again import Again, replaced
 from brrp_cli.mending.explain import measured, rendered, tolerance
 from brrp_cli.prior.store import Prior

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from brrp_cli.config.segmentation import MendConfig
+from brrp_cli.config.mending import MendConfig
 from brrp_cli.frames.frame import Frame
 from brrp_cli.geometry import backproject, project, transform_points
 from brrp_cli.prior.store import Prior

@@ -9,7 +9,8 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from brrp_cli.config.segmentation import RegroupConfig, SegmentConfig
+from brrp_cli.config.mending import RegroupConfig
+from brrp_cli.config.segmentation import SegmentConfig
 from brrp_cli.frames.frame import BACKGROUND, Frame
 from brrp_cli.mending.again import Again, replaced
 from brrp_cli.mending.explain import explained

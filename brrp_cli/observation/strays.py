@@ -18,8 +18,9 @@ from brrp_cli.frames.frame import Frame
 log = logging.getLogger(__name__)
 
 
-# The last frame that has none, and by what. What is left of a frame has no strays either.
-_clean: tuple[weakref.ref[Frame], StrayConfig] | None = None
+# Frames that have none, by identity and numbers, while they live: threads try several at a time.
+# What is left of a frame has no strays either.
+_clean: weakref.WeakValueDictionary[tuple[int, StrayConfig], Frame] = weakref.WeakValueDictionary()
 
 
 def without_strays(
@@ -37,9 +38,7 @@ def without_strays(
     Masks that are a pixel too wide hold what stands behind the object, and cameras mix the depths
     of both. One such pixel moves the middle of the object's bounding box by half its distance.
     """
-    global _clean
-    known = _clean
-    if known is not None and known[0]() is frame and known[1] == config:
+    if _clean.get((id(frame), config)) is frame:
         return frame
     stray = np.zeros(frame.shape, dtype=bool)
     for object_id in frame.object_ids if looked_at is None else looked_at:
@@ -59,7 +58,7 @@ def without_strays(
     if stray.any():
         points = np.where(stray[..., None], np.float32(np.nan), frame.points)
         frame = replace(frame, points=points)
-    _clean = weakref.ref(frame), config
+    _clean[id(frame), config] = frame
     return frame
 
 

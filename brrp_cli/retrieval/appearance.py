@@ -71,7 +71,7 @@ class AppearanceRetriever:
     @contextmanager
     def one_image(self) -> Iterator[None]:
         """See retrieval/base.py."""
-        self._seen = {}
+        self._seen, self._frame = {}, None
         try:
             yield
         finally:
@@ -110,13 +110,11 @@ class AppearanceRetriever:
         those that are known."""
         known = {} if self._seen is None else self._seen
         masks = {i: np.packbits(frame.segmap == i).tobytes() for i in frame.object_ids}
-        # What was looked at at leisure is known in haste, too.
-        found = {
-            i: known[mask, hasty]
-            for hasty in ((True, False) if self._hasty else (False,))
-            for i, mask in masks.items()
-            if (mask, hasty) in known
-        }
+        found = {i: known[mask, False] for i, mask in masks.items() if (mask, False) in known}
+        if self._hasty:
+            # Not of the others: what was tried before depends on how threads take turns.
+            tried = {i: (masks[i], True) for i in asked or masks if i not in found}
+            found |= {i: known[key] for i, key in tried.items() if key in known}
         new = [i for i in masks if i not in found and (asked is None or i in asked)]
         looked = self._compared(frame, new)
         known.update({(masks[i], self._hasty): seen for i, seen in looked.items()})

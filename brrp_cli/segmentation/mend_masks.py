@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from brrp_cli.config.segmentation import MendConfig
+from brrp_cli.config.mending import MendConfig
 from brrp_cli.dependencies import import_library
 from brrp_cli.frames.frame import BACKGROUND
 

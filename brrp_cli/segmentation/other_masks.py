@@ -13,7 +13,8 @@ from itertools import count, product
 import numpy as np
 from numpy.typing import NDArray
 
-from brrp_cli.config.segmentation import RegroupConfig, SegmentConfig
+from brrp_cli.config.mending import RegroupConfig
+from brrp_cli.config.segmentation import SegmentConfig
 from brrp_cli.dependencies import import_library
 from brrp_cli.frames.frame import BACKGROUND, Frame
 from brrp_cli.seeds import child_rng

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from table_scene import T_CAM_WORLD, TABLE, in_camera, photograph
 
-from brrp_cli.config.segmentation import MendConfig, SegmentConfig
+from brrp_cli.config.mending import MendConfig
+from brrp_cli.config.segmentation import SegmentConfig
 from brrp_cli.geometry import similarity
 from brrp_cli.mending.again import Again
 from brrp_cli.mending.claim import mended_masks

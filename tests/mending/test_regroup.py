@@ -12,8 +12,9 @@ from painted_scene import STRANGE, THINGS, photograph, write_things
 from brrp_cli import Reconstructor
 from brrp_cli.api import reconstruct, try_masks
 from brrp_cli.config import preset
+from brrp_cli.config.mending import RegroupConfig
 from brrp_cli.config.registration import TrialConfig
-from brrp_cli.config.segmentation import RegroupConfig, SegmentConfig
+from brrp_cli.config.segmentation import SegmentConfig
 from brrp_cli.errors import BrrpError
 from brrp_cli.mending.again import Again
 from brrp_cli.mending.mend import mend
@@ -23,6 +24,7 @@ from brrp_cli.prior.parameters import BuildParameters
 from brrp_cli.prior.store import open_prior
 from brrp_cli.reconstruction import TOO_FEW_POINTS, Similar
 from brrp_cli.retrieval.appearance import AppearanceRetriever
+from brrp_cli.retrieval.base import one_image
 
 # The can and the ball share a mask, the box comes in two, the plate was left out.
 PLACES = {"red_box": (-0.16, 0.06), "red_can": (0.1, 0.08), "yellow_ball": (0.1, -0.05)}
@@ -115,8 +117,28 @@ def test_a_trial_tells_what_a_reconstruction_does_and_infers_nothing(given, trut
     assert [item.outcome.name for item in tried] == [*PLACES, None]
     assert [item.object_id for item in tried] == [0, 1, 2, 3]
     assert all(item.surface is None and item.posterior is None for item in tried)
-    two = try_masks(bare, masks, TrialConfig(), **{**given, "workers": 2})
-    assert [item.unknown_weight for item in two] == [item.unknown_weight for item in tried]
+
+
+def test_tries_do_not_depend_on_those_before_them(given, first, frame):
+    """Not on how many there are at a time, either: what one leaves is what the next one tries."""
+    rows = np.nonzero(frame.segmap == BOTH)[0]
+    lower = np.arange(frame.shape[0])[:, None] > np.median(rows)
+    low = (frame.segmap == BOTH) & lower
+    masks = [low, (frame.segmap == BOTH) & ~lower, np.isin(frame.segmap, [BOX, OTHER_HALF])]
+
+    def told(order, workers):
+        with one_image(given["retriever"]):
+            reconstruct(frame, only=[STRANGE_ID], **given)
+            tried = [masks[i] for i in order]
+            found = try_masks(frame, tried, TrialConfig(), **{**given, "workers": workers})
+        return {
+            i: (each.unknown_probability, each.unknown_weight)
+            for i, each in zip(order, found, strict=True)
+        }
+
+    alone = told([0, 1, 2], 1)
+    assert len({repr(each) for each in alone.values()}) == 3
+    assert told([2, 1, 0], 1) == alone and told([0, 1, 2], 2) == alone
 
 
 def test_a_mask_without_depth_and_a_method_without_weights_are_told(given, truth):

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 from table_scene import SHAPE, T_CAM_WORLD, TABLE, K, in_camera, photograph
 
-from brrp_cli.config.segmentation import MendConfig
+from brrp_cli.config.mending import MendConfig
 from brrp_cli.raycast import look
 from brrp_cli.segmentation.mend_masks import Placed, mend_masks
 from brrp_cli.shapes import solids

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from table_scene import K, in_camera, photograph, placed
 
-from brrp_cli.config.segmentation import RegroupConfig, SegmentConfig
+from brrp_cli.config.mending import RegroupConfig
+from brrp_cli.config.segmentation import SegmentConfig
 from brrp_cli.frames.frame import Frame
 from brrp_cli.geometry import backproject
 from brrp_cli.segmentation.other_masks import OtherMask, other_masks, painted, unions
