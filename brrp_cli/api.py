@@ -11,7 +11,7 @@ import time
 from collections.abc import Collection, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,6 +29,7 @@ from brrp_cli.results import read
 from brrp_cli.results.read import StoredResult
 
 if TYPE_CHECKING:
+    from brrp_cli.executors.helpers import Helpers
     from brrp_cli.retrieval.base import Retriever
 
 
@@ -43,7 +44,9 @@ def reconstruct(
     seed: int = 0,
     device: str = "auto",
     workers: int | None = None,
+    helpers: Helpers | None = None,
     only: Collection[int] | None = None,
+    image: Any = None,
     stream: Stream | None = None,
 ) -> Reconstruction:
     """Reconstruct every object of a segmented frame.
@@ -54,8 +57,10 @@ def reconstruct(
         one, CLIP if `BRRP_CLIP_DIR` is set or CLIP was fetched, else appearance
     weights : a file of what the method was trained to
     workers : objects at a time, by default as many as there are cores
+    helpers : processes that do some of the objects, once they are ready (sessions start them)
     only : ids of the objects that are asked for, by default all; the others are still seen as
         objects
+    image : `Reconstruction.image` of the same frame with other masks
     stream : what earlier frames of the same stream showed (sessions pass it)
 
     An object that cannot be reconstructed gets a status; the others still are. The frame is never
@@ -67,9 +72,18 @@ def reconstruct(
     start = time.perf_counter()
     chosen = reconstructing_method(method)
     setup = _setup(
-        chosen, prior, config, retriever, weights, seed=seed, device=device, workers=workers
+        chosen,
+        prior,
+        config,
+        retriever,
+        weights,
+        seed=seed,
+        device=device,
+        workers=workers,
+        helpers=helpers,
     )
-    setup = replace(setup, only=None if only is None else frozenset(only), stream=stream)
+    asked = None if only is None else frozenset(only)
+    setup = replace(setup, only=asked, image=image, stream=stream)
     seconds = {"retriever": time.perf_counter() - start} if chosen.uses_retriever else {}
     result = chosen.run(frame, setup)
     objects = [each for each in result.objects if only is None or each.object_id in only]
@@ -89,6 +103,8 @@ def try_masks(
     seed: int = 0,
     device: str = "auto",
     workers: int | None = None,
+    helpers: Helpers | None = None,
+    image: Any = None,
 ) -> list[ObjectReconstruction]:
     """Which stored objects lie in each of other masks (H, W) of a frame, each in the place of the
     frame's own masks there: what it is taken for, without a shape.
@@ -99,9 +115,17 @@ def try_masks(
     if chosen.try_masks is None:
         raise BrrpError(f"{method} weighs no placements, and cannot try masks")
     setup = _setup(
-        chosen, prior, config, retriever, weights, seed=seed, device=device, workers=workers
+        chosen,
+        prior,
+        config,
+        retriever,
+        weights,
+        seed=seed,
+        device=device,
+        workers=workers,
+        helpers=helpers,
     )
-    return chosen.try_masks(frame, setup, Trial(masks, trial))
+    return chosen.try_masks(frame, replace(setup, image=image), Trial(masks, trial))
 
 
 def _setup(
@@ -114,6 +138,7 @@ def _setup(
     seed: int,
     device: str,
     workers: int | None,
+    helpers: Helpers | None,
 ) -> Setup:
     """What a method is given, checked. Errors: BrrpError."""
     if isinstance(retriever, str) and not chosen.uses_retriever:
@@ -126,6 +151,7 @@ def _setup(
         retriever=None if isinstance(retriever, str) else retriever,
         weights=None if weights is None else Path(weights),
         workers=workers,
+        helpers=helpers,
     )
     chosen.check(setup)
     if chosen.uses_retriever and setup.retriever is None and prior is not None:

@@ -271,6 +271,7 @@ class Reconstruction:
     configuration : what decided the result, plain JSON
     segmentation : the same of the masks, where they were made on the way; else None
     seconds : time of the stages that concern the whole frame.
+    image : what its method found of the image, whatever the masks, for other masks of it
     """
 
     frame: Frame
@@ -285,6 +286,7 @@ class Reconstruction:
     device: str
     seconds: dict[str, float] = field(default_factory=dict)
     segmentation: dict[str, Any] | None = None
+    image: Any = None
 
     @property
     def reconstructed(self) -> list[ObjectReconstruction]:

@@ -9,7 +9,7 @@ for frame in camera:
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import asdict, replace
 from functools import partial
 from pathlib import Path
@@ -25,11 +25,12 @@ from brrp_cli.config.tracking import SharpenConfig, TrackConfig
 from brrp_cli.errors import FrameError
 from brrp_cli.frames.frame import Frame
 from brrp_cli.geometry import normalise
-from brrp_cli.mending.again import Again
+from brrp_cli.mending.again import Again, Objects
 from brrp_cli.mending.mend import mend
 from brrp_cli.methods.base import EarlierView, Memory, Stream
 from brrp_cli.methods.configuration import MethodConfig
 from brrp_cli.methods.registry import DEFAULT, reconstructing_method
+from brrp_cli.methods.shared_work import started_later
 from brrp_cli.prior.store import Prior, open_prior
 from brrp_cli.reconstruction import ObjectReconstruction, Reconstruction
 from brrp_cli.retrieval.base import one_image
@@ -59,6 +60,8 @@ class Reconstructor:
     track : whether frames are those of one stream: an object keeps its id, and one that has not
         moved before a camera that stands keeps its result, and what earlier frames showed of one
         at rest joins what the newest shows; or the numbers of that
+    helpers : processes beside this one that do some of the objects from the second frame on; None =
+        one less than there are workers, 3 at most. Results do not depend on them
 
     Without `track` the same frame and seed give the same result as a process of its own.
     Errors: BrrpError.
@@ -80,6 +83,7 @@ class Reconstructor:
         device: str = "auto",
         workers: int | None = None,
         track: bool | TrackConfig = False,
+        helpers: int | None = None,
     ) -> None:
         self._track = TrackConfig() if track is True else track or None
         self._last: Followed | None = None
@@ -88,6 +92,7 @@ class Reconstructor:
         # Of each object, the frames that showed it and what the method remembers of them.
         self._seen: dict[int, list[tuple[Frame, Memory]]] = {}
         self._workers = workers
+        self.helpers = started_later(reconstructing_method(method), workers, helpers)
         self._method, self._seed, self._device, self._prompt = method, seed, device, prompt
         self._weights = weights
         chosen = reconstructing_method(method)
@@ -114,7 +119,20 @@ class Reconstructor:
         Errors: BrrpError; FrameError if nothing stands on the table.
         """
         with one_image(self._retriever):
-            return self._reconstructed(frame)
+            result = self._reconstructed(frame)
+        # Who asks for one frame only has no use for them.
+        self.helpers.start()
+        return result
+
+    def close(self) -> None:
+        """End the processes beside this one; with the session they end, too."""
+        self.helpers.close()
+
+    def __enter__(self) -> Reconstructor:
+        return self
+
+    def __exit__(self, *why: object) -> None:
+        self.close()
 
     def _reconstructed(self, frame: Frame) -> Reconstruction:
         start = time.perf_counter()
@@ -154,7 +172,7 @@ class Reconstructor:
         if todo or not self._made:
             result = infer(seen, todo)
         else:
-            result = replace(self._made[0][1], frame=seen, objects=[], seconds={})
+            result = replace(self._made[0][1], frame=seen, objects=[], seconds={}, image=None)
         objects = sorted([*result.objects, *kept], key=lambda item: item.object_id)
         result = replace(result, objects=objects)
         if mends:
@@ -174,7 +192,7 @@ class Reconstructor:
     def _mended(
         self,
         result: Reconstruction,
-        infer: Callable[[Frame, Collection[int]], Reconstruction],
+        infer: Objects,
         aside: NDArray[np.int64] | None,
         asked: Collection[int] | None = None,
         first_free: int = 1,
@@ -230,14 +248,20 @@ class Reconstructor:
         frame: Frame,
         only: Collection[int] | None = None,
         *,
+        image: Any = None,
         stream: Stream | None = None,
     ) -> Reconstruction:
-        return reconstruct(frame, only=only, stream=stream, **self._given)
+        return reconstruct(frame, only=only, image=image, stream=stream, **self._given)
 
     def _tried(
-        self, frame: Frame, masks: Sequence[NDArray[np.bool_]], trial: TrialConfig
+        self,
+        frame: Frame,
+        masks: Sequence[NDArray[np.bool_]],
+        trial: TrialConfig,
+        *,
+        image: Any = None,
     ) -> list[ObjectReconstruction]:
-        return try_masks(frame, masks, trial, **self._given)
+        return try_masks(frame, masks, trial, image=image, **self._given)
 
     @property
     def _given(self) -> dict[str, Any]:
@@ -250,6 +274,7 @@ class Reconstructor:
             "seed": self._seed,
             "device": self._device,
             "workers": self._workers,
+            "helpers": self.helpers,
         }
 
     def stream(self, frames: Iterable[Frame]) -> Iterator[Reconstruction | FrameError]:
@@ -266,6 +291,6 @@ class Reconstructor:
         from brrp_cli.segmentation.segment import segment_and_aside
 
         if self._segmenter is not None and self._prompt is not None:
-            return replace(frame, segmap=self._segmenter(frame, self._prompt, self._seed)), None
+            return frame.with_masks(self._segmenter(frame, self._prompt, self._seed)), None
         segmap, aside = segment_and_aside(frame, self._seed, self._segmentation)
-        return replace(frame, segmap=segmap), aside
+        return frame.with_masks(segmap), aside

@@ -67,6 +67,12 @@ def _short_turns() -> Iterator[None]:
         sys.setswitchinterval(before)
 
 
+def one_thread_for_good() -> None:
+    """As in the threads of `in_threads`, for a process that does nothing else."""
+    _hold()
+    thread_pools().limit(limits=1)
+
+
 def _hold() -> None:
     """OpenMP's number of threads is each thread's own."""
     import torch

@@ -8,7 +8,7 @@ near by, by their colour and size. Ids are never used again.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,7 +42,7 @@ def follow(last: Followed, frame: Frame, config: TrackConfig) -> Followed:
         if track is None:
             track, next_id = next_id, next_id + 1
         segmap[frame.segmap == object_id] = track
-    return Followed(replace(frame, segmap=segmap), next_id)
+    return Followed(frame.with_masks(segmap), next_id)
 
 
 def unmoved(before: Frame, frame: Frame, config: TrackConfig) -> frozenset[int]:

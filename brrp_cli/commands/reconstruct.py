@@ -199,6 +199,7 @@ def command(
     from brrp_cli.mending.mend import mend
     from brrp_cli.methods.config_file import read_config
     from brrp_cli.methods.configuration import as_record
+    from brrp_cli.methods.shared_work import started_later
     from brrp_cli.results.bop import bop_csv
     from brrp_cli.results.write import check_output, write_results
     from brrp_cli.retrieval.base import one_image
@@ -233,6 +234,8 @@ def command(
     if prior is None:
         trained = "" if weights is None else f", weights {weights}"
         note(f"Method: {method}, without a prior{trained}")
+    # Who asks for one frame has no use for them.
+    helpers = started_later(chosen, workers, 0 if frames is None else None)
     given: dict[str, Any] = {
         "prior": prior,
         "method": method,
@@ -242,9 +245,10 @@ def command(
         "seed": seed,
         "device": device,
         "workers": workers,
+        "helpers": helpers,
     }
     run: Callable[..., Reconstruction] = partial(reconstruct, **given)
-    again = Again(lambda frame, ids: run(frame, only=ids), partial(try_masks, **given))
+    again = Again(run, partial(try_masks, **given))
 
     def one(frame: Frame, masks: MadeMasks | None, output: Path) -> list[Told]:
         """Reconstruct a frame, write it all, and say what was written."""
@@ -252,6 +256,7 @@ def command(
             result = run(frame)
             if masks is not None:
                 result = mend(result, prior, again, masks.config, masks.aside)
+        helpers.start()
         if masks is not None:
             tell_mended(frame, result.frame, output)
             result = replace(result, segmentation=asdict(masks.config))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -101,11 +100,11 @@ def command(
         frame, _ = source.make_masks(frame, seed, config)
     before = frame
     for object_id, pieces in splits:
-        frame = replace(frame, segmap=edit_masks.split(frame, object_id, pieces, seed, config))
+        frame = frame.with_masks(edit_masks.split(frame, object_id, pieces, seed, config))
     for group in merges:
-        frame = replace(frame, segmap=edit_masks.merge(frame, group))
+        frame = frame.with_masks(edit_masks.merge(frame, group))
     for group in drops:
-        frame = replace(frame, segmap=edit_masks.drop(frame, group))
+        frame = frame.with_masks(edit_masks.drop(frame, group))
     with report_of(as_json) as report:
         report["objects"] = _report(require_objects(frame), before)
         write_picture(frame, picture)

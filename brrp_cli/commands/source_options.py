@@ -188,15 +188,14 @@ class SourceOptions:
 
         Errors: FrameError if nothing is found; MaskError if the models cannot be used.
         """
-        from dataclasses import replace
 
         from brrp_cli.segmentation.segment import segment_and_aside
 
         if self.prompt is None:
             segmap, aside = segment_and_aside(frame, seed, config, keep_all=self.keep_all)
-            return replace(frame, segmap=segmap), aside
+            return frame.with_masks(segmap), aside
         segmap = _prompt_segmenter(self.masks_dir, config)(frame, self.prompt, seed)
-        return replace(frame, segmap=segmap), None
+        return frame.with_masks(segmap), None
 
 
 @cache

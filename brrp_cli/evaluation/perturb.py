@@ -23,7 +23,7 @@ def shift_masks(frame: Frame, pixels: int) -> Frame:
     """The frame with its masks moved to the right (to the left if negative), as in the paper's
     experiment on robustness; what comes in at the edge is background.
     """
-    return replace(frame, segmap=_shifted(frame.segmap, pixels)) if pixels else frame
+    return frame.with_masks(_shifted(frame.segmap, pixels)) if pixels else frame
 
 
 def _shifted(segmap: NDArray[np.int64], pixels: int) -> NDArray[np.int64]:

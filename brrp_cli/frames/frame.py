@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from copy import copy
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -90,6 +91,23 @@ class Frame:
     def object_ids(self) -> list[int]:
         """Ids in the mask, ascending, without the background."""
         return [int(i) for i in np.unique(self.segmap) if i != BACKGROUND]
+
+    def with_masks(self, segmap: NDArray[np.integer]) -> Frame:
+        """The same image with other masks (H, W). Unlike `dataclasses.replace` it copies nothing
+        but these. Errors: FrameError for another shape."""
+        if segmap.shape != self.shape:
+            raise FrameError(
+                "The masks have another size than the frame",
+                where=self.source,
+                expected=self.shape,
+                found=segmap.shape,
+            )
+        masks = segmap.astype(np.int64)
+        masks.setflags(write=False)
+        frame = copy(self)
+        object.__setattr__(frame, "segmap", masks)
+        vars(frame).pop("object_ids", None)
+        return frame
 
     def object_points(self, object_id: int) -> NDArray[np.float32]:
         """(n, 3) valid points of one object, metres, camera frame."""

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TypeVar
 
@@ -89,7 +89,7 @@ class Scene:
             return frame
         log.info("%s: ids %s are no object's, taken as background", frame.source, strangers)
         segmap = np.where(np.isin(frame.segmap, known), frame.segmap, BACKGROUND)
-        return replace(frame, segmap=segmap)
+        return frame.with_masks(segmap)
 
     def object(self, object_id: int) -> TrueObject:
         """The true object of that id."""

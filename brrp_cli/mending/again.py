@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,14 +14,33 @@ from brrp_cli.frames.frame import Frame
 from brrp_cli.reconstruction import ObjectReconstruction, Reconstruction
 
 
+class Objects(Protocol):
+    """Reconstructs the objects of a frame whose ids are given; image : as in `Setup`."""
+
+    def __call__(self, frame: Frame, *, only: Collection[int], image: Any = None) -> Reconstruction:
+        """See above."""
+
+
+class Masks(Protocol):
+    """Looks which stored objects lie in each of other masks (H, W) of a frame."""
+
+    def __call__(
+        self,
+        frame: Frame,
+        masks: Sequence[NDArray[np.bool_]],
+        trial: TrialConfig,
+        *,
+        image: Any = None,
+    ) -> list[ObjectReconstruction]:
+        """See above."""
+
+
 @dataclass(frozen=True)
 class Again:
-    """objects : reconstructs those objects of a frame whose ids are given
-    masks : looks which stored objects lie in each of other masks (H, W) of a frame
-    """
+    """How a frame is looked at once more."""
 
-    objects: Callable[[Frame, Collection[int]], Reconstruction]
-    masks: Callable[[Frame, Sequence[NDArray[np.bool_]], TrialConfig], list[ObjectReconstruction]]
+    objects: Objects
+    masks: Masks
 
 
 def replaced(
@@ -31,6 +51,9 @@ def replaced(
     asked = set(changed) & set(frame.object_ids)
     stay = set(frame.object_ids) - asked
     kept = [each for each in result.objects if each.object_id in stay]
-    result = again.objects(frame, asked) if asked else replace(result, frame=frame)
+    if asked:
+        result = again.objects(frame, only=asked, image=result.image)
+    else:
+        result = replace(result, frame=frame)
     objects = [*kept, *(each for each in result.objects if each.object_id in asked)]
     return replace(result, objects=sorted(objects, key=lambda each: each.object_id))

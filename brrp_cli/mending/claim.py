@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 from brrp_cli.config.mending import MendConfig
 from brrp_cli.mending.again import Again, replaced
 from brrp_cli.mending.explain import measured, rendered, tolerance
@@ -24,7 +22,7 @@ def claim(
         mended = mended_masks(result, prior, config, first_free)
         if mended.segmap is result.frame.segmap:
             break
-        frame = replace(result.frame, segmap=mended.segmap)
+        frame = result.frame.with_masks(mended.segmap)
         result = replaced(result, frame, mended.changed, again)
     return result
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
@@ -76,7 +76,9 @@ def _one_round(
     whole = [each.object_id for each in result.objects if each.like is not None]
     masks = other_masks(frame, doubtful, aside, config, result.seed, whole)
     found: list[_Found] = []
-    tried = again.masks(frame, [each.mask for each in masks], own.trial) if masks else []
+    tried: list[ObjectReconstruction] = []
+    if masks:
+        tried = again.masks(frame, [each.mask for each in masks], own.trial, image=result.image)
     for mask, item in zip(masks, tried, strict=True):
         if not _recognised(item, own.sure):
             continue
@@ -94,7 +96,7 @@ def _one_round(
     segmap, named = painted(frame.segmap, chosen, first_free)
     segmap = _without_scraps(segmap, named, frame, own)
     changed = set(named).union(*(each.of for each in chosen))
-    return replaced(result, replace(frame, segmap=segmap), changed, again)
+    return replaced(result, frame.with_masks(segmap), changed, again)
 
 
 def _recognised(item: ObjectReconstruction, least_weight: float) -> bool:

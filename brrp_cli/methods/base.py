@@ -20,6 +20,7 @@ from brrp_cli.errors import BrrpError, PriorError, WeightsError
 from brrp_cli.methods.configuration import MethodConfig
 
 if TYPE_CHECKING:
+    from brrp_cli.executors.helpers import Helpers
     from brrp_cli.frames.frame import Frame
     from brrp_cli.prior.store import Prior
     from brrp_cli.reconstruction import ObjectReconstruction, Reconstruction, StoredPosterior
@@ -73,7 +74,9 @@ class Setup:
     config : one of its presets, or a changed one; device : "auto", "cpu" or "cuda"
     prior, retriever, weights : only where the method uses them
     workers : objects at a time; None = as many as there are cores. Results do not depend on it
+    helpers : processes that do some of the objects, for a method that `takes_helpers`
     only : the ids that are asked for, for a method that works `object_by_object`; None = all
+    image : `Reconstruction.image` of the same frame with other masks
     stream : of which the frame is one, for a method that remembers; None = the frame stands alone
     """
 
@@ -84,7 +87,9 @@ class Setup:
     retriever: Retriever | None = None
     weights: Path | None = None
     workers: int | None = None
+    helpers: Helpers | None = None
     only: frozenset[int] | None = None
+    image: Any = None
     stream: Stream | None = None
 
 
@@ -107,6 +112,7 @@ class Method:
         is not trained. Errors: WeightsError
     try_masks : which stored objects lie in each of other masks, without their shapes; None for a
         method that weighs no placements
+    takes_helpers : whether it lets other processes do some of the objects
     object_by_object : whether it does no work for ids that `Setup.only` leaves out
     gives_shapes : whether it reconstructs, or is there to be measured alone
     """
@@ -122,6 +128,7 @@ class Method:
     describe_weights: Callable[[Path], dict[str, Any]] | None = None
     uses_cuda: bool = False
     try_masks: Callable[[Frame, Setup, Trial], list[ObjectReconstruction]] | None = None
+    takes_helpers: bool = False
     object_by_object: bool = False
     gives_shapes: bool = True
 

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import time
-from functools import partial
+from collections.abc import Callable
+from contextlib import ExitStack
 from typing import TYPE_CHECKING
 
 from brrp_cli.config import PRESETS, Config
@@ -12,22 +13,19 @@ from brrp_cli.methods.configuration import as_record
 
 if TYPE_CHECKING:
     from brrp_cli.frames.frame import Frame
-    from brrp_cli.observation.ray_samples import ObjectObservation
     from brrp_cli.prior.store import Prior
     from brrp_cli.reconstruction import ObjectReconstruction, Reconstruction, StoredPosterior
 
 
 def run(frame: Frame, setup: Setup) -> Reconstruction:
     """Every object of a frame, as the configuration says. The same seed gives the same bytes,
-    whatever the number of workers."""
+    whatever the number of workers, and with helpers or without."""
     from brrp_cli.device import pick_device
-    from brrp_cli.methods.brrp_default import reconstruct_by_hypotheses
+    from brrp_cli.methods.brrp_objects import by_hypotheses
     from brrp_cli.methods.brrp_paper import reconstruct_object
     from brrp_cli.methods.each_object import too_few, with_surface
-    from brrp_cli.methods.earlier_views import EarlierViews
-    from brrp_cli.observation.pixel_noise import pixel_noise
-    from brrp_cli.observation.ray_samples import observe
-    from brrp_cli.observation.sensor_noise import wave_deviation
+    from brrp_cli.methods.scene import look_at
+    from brrp_cli.observation.ray_samples import sampled_scene
     from brrp_cli.observation.strays import without_strays
     from brrp_cli.progress import progress
     from brrp_cli.reconstruction import Reconstruction
@@ -43,46 +41,39 @@ def run(frame: Frame, setup: Setup) -> Reconstruction:
     given = frame
     if config.hypotheses is not None:
         frame = without_strays(frame, config.strays, setup.only)
-    scene = observe(frame, config.observation, seed, workers)
-    if config.hypotheses is not None:
-        wave = wave_deviation(frame, scene.plane, config.hypotheses.sensor)
-        noise = pixel_noise(frame, scene.plane, config.hypotheses.sensor)
-    seconds = {"observation": time.perf_counter() - start}
+    with ExitStack() as stack:
+        infer: Callable[[int], ObjectReconstruction]
+        if config.hypotheses is not None:
+            scene = look_at(frame, setup, retriever)
+            image = scene.image
+            sampled = sampled_scene(frame, config.observation, seed, image.plane)
+            infer = stack.enter_context(by_hypotheses(scene, sampled, retriever, setup))
+        else:
+            image, sampled = None, sampled_scene(frame, config.observation, seed)
 
-    def one(observation: ObjectObservation) -> ObjectReconstruction:
-        if config.hypotheses is None:
-            return reconstruct_object(
-                frame, observation, prior, retriever, config, seed=seed, device=device
-            )
-        earlier = None
-        if setup.stream is not None:
-            earlier = EarlierViews.of(
-                setup.stream.earlier.get(observation.object_id, ()), setup.stream.config
-            )
-        return reconstruct_by_hypotheses(
-            frame,
-            scene.plane,
-            wave,
-            noise,
-            observation,
-            prior,
-            retriever,
-            config,
-            seed=seed,
-            device=device,
-            earlier=earlier,
-        )
+            def infer(object_id: int) -> ObjectReconstruction:
+                def one() -> ObjectReconstruction:
+                    observation = sampled.observation(object_id)
+                    return reconstruct_object(
+                        frame, observation, prior, retriever, config, seed=seed, device=device
+                    )
 
-    def whole(object_id: int) -> ObjectReconstruction:
-        if object_id in scene.too_few:
-            return too_few(object_id, scene.too_few[object_id], config.observation.min_points)
-        return with_surface(object_id, partial(one, scene.objects[object_id]), config.surface)
+                return with_surface(object_id, one, config.surface)
 
-    ids = [i for i in frame.object_ids if setup.only is None or i in setup.only]
+        seconds = {"observation": time.perf_counter() - start}
+
+        def whole(object_id: int) -> ObjectReconstruction:
+            if object_id in sampled.too_few:
+                count = sampled.too_few[object_id]
+                return too_few(object_id, count, config.observation.min_points)
+            return infer(object_id)
+
+        ids = [i for i in frame.object_ids if setup.only is None or i in setup.only]
+        objects = list(progress(in_threads(whole, ids, workers), "objects", len(ids)))
     return Reconstruction(
         frame=given,
-        objects=list(progress(in_threads(whole, ids, workers), "objects", len(ids))),
-        plane=scene.plane,
+        objects=objects,
+        plane=sampled.plane,
         method=METHOD.name,
         retriever=retriever.name,
         prior_path=prior.path,
@@ -91,6 +82,7 @@ def run(frame: Frame, setup: Setup) -> Reconstruction:
         seed=seed,
         device=device,
         seconds=seconds,
+        image=image,
     )
 
 
@@ -126,4 +118,5 @@ METHOD = Method(
     try_masks=_try_masks,
     uses_cuda=True,
     object_by_object=True,
+    takes_helpers=True,
 )

@@ -9,16 +9,13 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from brrp_cli.config import Config, FittedMapConfig, HypothesesConfig
+from brrp_cli.config import FittedMapConfig, HypothesesConfig
 from brrp_cli.config.registration import TrialConfig
-from brrp_cli.frames.frame import Frame
 from brrp_cli.methods.earlier_views import ALONE, EarlierViews, remember
 from brrp_cli.methods.infer_object import infer_object, placed_shape
 from brrp_cli.methods.kin_hypotheses import KinHypothesis, kin_hypotheses
-from brrp_cli.observation.pixel_noise import PixelNoise
+from brrp_cli.methods.scene import Scene
 from brrp_cli.observation.ray_samples import ObjectObservation
-from brrp_cli.observation.support_plane import Plane
-from brrp_cli.prior.store import Prior
 from brrp_cli.reconstruction import OK, ObjectReconstruction, Retrieved, Similar
 from brrp_cli.registration.likelihood import SeenObject, see
 from brrp_cli.registration.model import search_model
@@ -35,7 +32,7 @@ from brrp_cli.registration.weigh import (
     judged,
     weigh,
 )
-from brrp_cli.retrieval.base import Retriever, knows_depth, top_k, unknown
+from brrp_cli.retrieval.base import top_k, unknown
 from brrp_cli.seeds import child_rng, child_seed
 from brrp_cli.timing import timed
 
@@ -43,29 +40,24 @@ Array = NDArray[np.float64]
 
 
 def reconstruct_by_hypotheses(
-    frame: Frame,
-    plane: Plane | None,
-    wave: float,
-    noise: PixelNoise,
+    scene: Scene,
     observation: ObjectObservation,
-    prior: Prior,
-    retriever: Retriever,
-    config: Config,
+    probabilities: Array,
     *,
-    seed: int,
-    device: str,
     earlier: EarlierViews | None = None,
     trial: TrialConfig | None = None,
 ) -> ObjectReconstruction:
     """Posterior of one object from hypotheses about the k retrieved objects and from the one that
     it is none of them, each corrected by what was observed.
 
-    wave : metres, standard deviation of the mean depth of a patch (observation/sensor_noise.py);
-    noise : of the frame's pixels; earlier : views of the object in the stream's earlier frames;
-    None = there is no stream; trial : nothing is inferred, only told which stored objects lie there
+    probabilities : P(c|R) (n,); earlier : views of the object in the stream's earlier frames; None
+    = there is no stream; trial : nothing is inferred, only told which stored objects lie there
     """
+    frame, image = scene.frame, scene.image
+    plane, wave, noise = image.plane, image.wave, image.noise
+    prior, config, seed, device = scene.prior, scene.config, scene.seed, scene.device
     assert config.hypotheses is not None
-    hypotheses = counted_once(config.hypotheses, knows_depth(retriever))
+    hypotheses = counted_once(config.hypotheses, scene.aligns)
     if trial is not None:
         short = replace(
             hypotheses.search,
@@ -86,21 +78,19 @@ def reconstruct_by_hypotheses(
             if not views.agree(begun, hypotheses.search.model_points):
                 # It has been moved: what was seen of it elsewhere is forgotten.
                 views, begun = EarlierViews((), views.config), {}
-    with timed(seconds, "retrieval"):
-        seen_now = retriever.probabilities(frame, object_id)
-        probabilities = views.probabilities(seen_now)
-        count = config.k if trial is None else min(config.k, trial.objects)
-        chosen = top_k(probabilities, prior.names, count)
-        if trial is not None:
-            chosen = [each for each in chosen if each[1] >= trial.likely * chosen[0][1]]
-        chosen += [
-            (name, float(probabilities[prior.names.index(name)]))
-            for name in begun
-            if name not in dict(chosen)
-        ]
-        missing = unknown(probabilities)
-        # Stored objects that are not tried are as good as not in the prior.
-        none_tried = unknown(np.array([probability for _, probability in chosen]))
+    seen_now, probabilities = probabilities, views.probabilities(probabilities)
+    count = config.k if trial is None else min(config.k, trial.objects)
+    chosen = top_k(probabilities, prior.names, count)
+    if trial is not None:
+        chosen = [each for each in chosen if each[1] >= trial.likely * chosen[0][1]]
+    chosen += [
+        (name, float(probabilities[prior.names.index(name)]))
+        for name in begun
+        if name not in dict(chosen)
+    ]
+    missing = unknown(probabilities)
+    # Stored objects that are not tried are as good as not in the prior.
+    none_tried = unknown(np.array([probability for _, probability in chosen]))
     told = partial(
         ObjectReconstruction,
         object_id=object_id,
@@ -111,8 +101,6 @@ def reconstruct_by_hypotheses(
         unknown_probability=missing,
         seconds=seconds,
     )
-    if trial is not None and missing > trial.most_missing:
-        return told(unknown_weight=1.0)
     with timed(seconds, "registration"):
         observed = observed_cloud(observation.points, config.features)
         lost = views.lost(hypotheses) if begun else frozenset()

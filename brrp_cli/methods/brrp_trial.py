@@ -3,69 +3,84 @@
 from __future__ import annotations
 
 import logging
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from brrp_cli.config import Config
-from brrp_cli.device import pick_device
 from brrp_cli.frames.frame import Frame
 from brrp_cli.methods.base import Setup, Trial
 from brrp_cli.methods.brrp_default import reconstruct_by_hypotheses
-from brrp_cli.methods.each_object import too_few, with_surface
-from brrp_cli.observation.pixel_noise import pixel_noise
-from brrp_cli.observation.ray_samples import scene_plane, without_samples
-from brrp_cli.observation.sensor_noise import wave_deviation
+from brrp_cli.methods.each_object import guarded, too_few
+from brrp_cli.methods.scene import Scene, look_at
+from brrp_cli.methods.shared_work import shared_work
+from brrp_cli.observation.ray_samples import without_samples
 from brrp_cli.observation.strays import without_strays
 from brrp_cli.reconstruction import OK, ObjectReconstruction
-from brrp_cli.retrieval.base import hasty
+from brrp_cli.retrieval.base import hasty, unknown
 from brrp_cli.retrieval.checked import CheckedRetriever
 from brrp_cli.threads import cores, in_threads
+
+
+@dataclass(frozen=True)
+class _Tries:
+    """scene : of the frame as it is; tried_id : of what is tried, which no object has"""
+
+    scene: Scene
+    trial: Trial
+    tried_id: int
 
 
 def try_masks(frame: Frame, setup: Setup, trial: Trial) -> list[ObjectReconstruction]:
     """What each mask is taken for, numbered from 0, without posteriors and surfaces; of the preset
     `paper`, which weighs no placements, nothing is told."""
-    config, prior, seed = setup.config, setup.prior, setup.seed
+    config, prior = setup.config, setup.prior
     assert isinstance(config, Config) and prior is not None and setup.retriever is not None
-    hypotheses = config.hypotheses
-    if hypotheses is None:
+    if config.hypotheses is None:
         return [ObjectReconstruction(number, OK) for number in range(len(trial.masks))]
     retriever = CheckedRetriever(setup.retriever, len(prior.names))
     frame = without_strays(frame, config.strays, ())
     # A mask that is tried takes little from the background, if anything.
-    plane = scene_plane(frame, config.observation, seed)
-    wave = wave_deviation(frame, plane, hypotheses.sensor)
-    noise = pixel_noise(frame, plane, hypotheses.sensor)
-    tried_id = int(frame.segmap.max()) + 1
-    least, device = config.observation.min_points, pick_device(setup.device)
+    scene = look_at(frame, setup, retriever)
+    tries = _Tries(scene, trial, int(frame.segmap.max()) + 1)
+    least = config.observation.min_points
 
-    def one(mask: NDArray[np.bool_]) -> ObjectReconstruction:
-        tried = replace(frame, segmap=np.where(mask, tried_id, frame.segmap))
-        tried = without_strays(tried, config.strays, (), [tried_id])
-        count = len(tried.object_points(tried_id))
-        if count < least:
-            return too_few(tried_id, count, least)
-        return reconstruct_by_hypotheses(
-            tried,
-            plane,
-            wave,
-            noise,
-            without_samples(tried, tried_id),
-            prior,
-            retriever,
-            config,
-            seed=seed,
-            device=device,
-            trial=trial.config,
-        )
+    with (
+        hasty(setup.retriever),
+        shared_work(_placed, tries, setup.helpers) as work,
+    ):
 
-    def whole(number: int) -> ObjectReconstruction:
-        infer = partial(one, trial.masks[number])
-        found = with_surface(number, infer, config.surface, logging.DEBUG)
-        return replace(found, object_id=number)
+        def one(number: int) -> ObjectReconstruction:
+            tried = _tried_frame(tries, number)
+            count = len(tried.object_points(tries.tried_id))
+            if count < least:
+                return too_few(number, count, least)
+            probabilities = retriever.probabilities(tried, tries.tried_id)
+            missing = unknown(probabilities)
+            if missing > trial.config.most_missing:
+                return ObjectReconstruction(
+                    number, OK, unknown_probability=missing, unknown_weight=1.0
+                )
+            return replace(work(number, probabilities), object_id=number)
 
-    with hasty(setup.retriever):
+        def whole(number: int) -> ObjectReconstruction:
+            return guarded(number, partial(one, number), logging.DEBUG)
+
         return list(in_threads(whole, range(len(trial.masks)), setup.workers or cores()))
+
+
+def _tried_frame(tries: _Tries, number: int) -> Frame:
+    """The frame with one of the masks in the place of its own."""
+    frame, tried_id = tries.scene.frame, tries.tried_id
+    segmap = np.where(tries.trial.masks[number], tried_id, frame.segmap)
+    return without_strays(frame.with_masks(segmap), tries.scene.config.strays, (), [tried_id])
+
+
+def _placed(tries: _Tries, number: int, probabilities: NDArray[np.float64]) -> ObjectReconstruction:
+    tried = _tried_frame(tries, number)
+    observation = without_samples(tried, tries.tried_id)
+    return reconstruct_by_hypotheses(
+        replace(tries.scene, frame=tried), observation, probabilities, trial=tries.trial.config
+    )

@@ -21,15 +21,20 @@ def with_surface(
     surface: SurfaceConfig,
     level: int = logging.WARNING,
 ) -> ObjectReconstruction:
-    """What `infer` says of one object, with its surface, or with the status of having failed, which
-    the log tells at that level.
+    """What `infer` says of one object, with its surface, `guarded`."""
+    return guarded(object_id, lambda: checked(infer(), surface), level)
+
+
+def guarded(
+    object_id: int, make: Callable[[], ObjectReconstruction], level: int = logging.WARNING
+) -> ObjectReconstruction:
+    """What `make` gives of one object, or the status of having failed, which the log tells at that
+    level.
 
     Errors: PriorError, since a damaged prior is no fault of the object that comes upon it.
     """
     try:
-        result = infer()
-        _check_finite(result)
-        _add_surface(result, surface)
+        return make()
     except PriorError:
         raise
     except BrrpError as error:
@@ -41,6 +46,13 @@ def with_surface(
         log.debug("Object %d", object_id, exc_info=True)
         message = f"an error that brrp does not know: {error!r} (--verbose shows the traceback)"
         return ObjectReconstruction(object_id, FAILED, message)
+
+
+def checked(result: ObjectReconstruction, surface: SurfaceConfig) -> ObjectReconstruction:
+    """What was inferred of one object, with its surface. Errors: BrrpError for numbers that are not
+    finite."""
+    _check_finite(result)
+    _add_surface(result, surface)
     return result
 
 

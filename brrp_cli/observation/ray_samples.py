@@ -39,6 +39,50 @@ class ObjectObservation:
 
 
 @dataclass(frozen=True)
+class SampledScene:
+    """What samples of every object with enough points are taken from, metres, camera frame.
+
+    plane : None where no support plane was found, and then no sample comes from below it
+    points, surfaces : id -> (n, 3) float32, valid points of the mask, and those thinned; rays :
+    (m, 3) float32 free samples in front of what was seen; too_few : id -> number of valid points,
+    for the other objects
+    """
+
+    plane: Plane | None
+    points: dict[int, NDArray[np.float32]]
+    surfaces: dict[int, NDArray[np.float32]]
+    rays: NDArray[np.float32]
+    too_few: dict[int, int]
+    config: ObservationConfig
+    seed: int
+
+    def observation(self, object_id: int) -> ObjectObservation:
+        """Samples of one object; the same, whichever others are asked for."""
+        config = self.config
+        center = box_center(self.points[object_id])
+        free = [_within(self.rays, center, config.ray_radius)]
+        if self.plane is not None:
+            free.append(below_samples(center, self.plane, config, self.seed, object_id))
+        free = [
+            grid_subsample(np.concatenate(free), config.free_cell),
+            *(
+                _within(other, center, config.ray_radius)
+                for i, other in self.surfaces.items()
+                if i != object_id
+            ),
+        ]
+        occupied = self.surfaces[object_id]
+        samples = np.concatenate([occupied, *free])
+        return ObjectObservation(
+            object_id=object_id,
+            points=self.points[object_id],
+            center=center,
+            samples=samples,
+            labels=np.arange(len(samples)) < len(occupied),
+        )
+
+
+@dataclass(frozen=True)
 class SceneObservation:
     """Samples of every object with enough points.
 
@@ -56,44 +100,29 @@ def observe(
 ) -> SceneObservation:
     """Sample the frame around each of its objects. The same seed gives the same bytes, whatever the
     number of `workers`, objects at a time."""
+    scene = sampled_scene(frame, config, seed)
+    ids = list(scene.points)
+    objects = dict(zip(ids, in_threads(scene.observation, ids, workers), strict=True))
+    return SceneObservation(plane=scene.plane, objects=objects, too_few=scene.too_few)
+
+
+def sampled_scene(
+    frame: Frame, config: ObservationConfig, seed: int, *known: Plane | None
+) -> SampledScene:
+    """What objects are sampled from. known : the support plane, where it is known already."""
     points = {i: frame.object_points(i) for i in frame.object_ids}
     too_few = {i: len(p) for i, p in points.items() if len(p) < config.min_points}
-    centers = {i: box_center(p) for i, p in points.items() if i not in too_few}
-    if not centers:
-        return SceneObservation(plane=None, objects={}, too_few=too_few)
-
-    plane = scene_plane(frame, config, seed)
+    points = {i: p for i, p in points.items() if i not in too_few}
+    if not points:
+        nothing = np.zeros((0, 3), np.float32)
+        return SampledScene(None, {}, {}, nothing, too_few, config, seed)
+    (plane,) = known or (scene_plane(frame, config, seed),)
     if plane is None:
         log.warning("No support plane near the objects: nothing is sampled below one")
-
-    rays = ray_samples(frame.points[frame.valid], np.array(list(centers.values())), config, seed)
+    centers = np.array([box_center(p) for p in points.values()])
+    rays = ray_samples(frame.points[frame.valid], centers, config, seed)
     surfaces = {i: grid_subsample(p, config.surface_cell) for i, p in points.items()}
-
-    def sample(object_id: int) -> ObjectObservation:
-        center = centers[object_id]
-        free = [_within(rays, center, config.ray_radius)]
-        if plane is not None:
-            free.append(below_samples(center, plane, config, seed, object_id))
-        free = [
-            grid_subsample(np.concatenate(free), config.free_cell),
-            *(
-                _within(other, center, config.ray_radius)
-                for i, other in surfaces.items()
-                if i != object_id
-            ),
-        ]
-        occupied = surfaces[object_id]
-        samples = np.concatenate([occupied, *free])
-        return ObjectObservation(
-            object_id=object_id,
-            points=points[object_id],
-            center=center,
-            samples=samples,
-            labels=np.arange(len(samples)) < len(occupied),
-        )
-
-    objects = dict(zip(centers, in_threads(sample, list(centers), workers), strict=True))
-    return SceneObservation(plane=plane, objects=objects, too_few=too_few)
+    return SampledScene(plane, points, surfaces, rays, too_few, config, seed)
 
 
 def without_samples(frame: Frame, object_id: int) -> ObjectObservation:

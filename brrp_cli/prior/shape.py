@@ -3,7 +3,7 @@ it matters: within millimetres of the surface."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import cached_property
 from typing import Any
 
@@ -33,6 +33,10 @@ class StoredShape:
     faces: NDArray[np.int32]
     colours: NDArray[np.uint8]
     field: DistanceField
+
+    def __getstate__(self) -> dict[str, Any]:
+        # What follows from the rest is made again: Open3D's scenes do not go between processes.
+        return {each.name: getattr(self, each.name) for each in fields(self)}
 
     @cached_property
     def scene(self) -> Any:

@@ -104,6 +104,12 @@ class Prior:
                 self._held.popitem(last=False)
             return found
 
+    @property
+    def held(self) -> list[PriorObject]:
+        """The objects that are held at the moment."""
+        with self._reading:
+            return list(self._held.values())
+
     def parts(
         self, names: Sequence[str], keys: Sequence[str]
     ) -> Iterator[tuple[str, dict[str, NDArray[Any]]]]:

@@ -227,3 +227,18 @@ def test_the_callers_arrays_stay_as_they_were():
     assert frame.object_ids == [7]
     with pytest.raises(ValueError, match="read-only"):
         frame.points[0, 0] = 0
+
+
+def test_other_masks_leave_the_image_as_it_is():
+    depth = np.full((3, 4), 0.5, np.float32)
+    frame = make_frame(segmap=np.ones((3, 4), np.int64), depth=depth, K=np.eye(3))
+    assert frame.valid.all() and frame.object_ids == [1]
+    masks = np.zeros(frame.shape, np.uint8)
+    masks[0, 1] = 7
+    other = frame.with_masks(masks)
+    assert other.object_ids == [7] and frame.object_ids == [1]
+    assert other.points is frame.points and other.valid is frame.valid
+    masks[0, 1] = 0
+    assert other.segmap[0, 1] == 7 and not other.segmap.flags.writeable
+    with pytest.raises(FrameError, match="another size"):
+        frame.with_masks(masks[:, 1:])

@@ -76,7 +76,7 @@ def test_what_changed_is_reconstructed_again_and_nothing_else(prior):
     first = reconstruction(frame, objects)
     asked = []
 
-    def infer(frame, only):
+    def infer(frame, only, **known):
         asked.append(([*frame.object_ids], [*only]))
         return reconstruction(frame, [ObjectReconstruction(1, OK, n_points=5)])
 

@@ -74,9 +74,7 @@ def given(prior):
 
 @pytest.fixture(scope="module")
 def again(given):
-    return Again(
-        lambda frame, only: reconstruct(frame, only=only, **given), partial(try_masks, **given)
-    )
+    return Again(partial(reconstruct, **given), partial(try_masks, **given))
 
 
 @pytest.fixture(scope="module")
@@ -163,9 +161,9 @@ def test_what_a_stretched_object_explains_is_not_cut(first, prior, again):
     """It may still be a part of something larger."""
     tried = []
 
-    def masks(frame, masks, trial):
+    def masks(frame, masks, trial, **known):
         tried.append(masks)
-        return again.masks(frame, masks, trial)
+        return again.masks(frame, masks, trial, **known)
 
     spied = Again(again.objects, masks)
     like = [
@@ -182,9 +180,9 @@ def test_what_a_stretched_object_explains_is_not_cut(first, prior, again):
 def test_only_masks_that_are_asked_about_are_tried(first, prior, again, frame):
     tried = []
 
-    def masks(frame, masks, trial):
+    def masks(frame, masks, trial, **known):
         tried.extend(masks)
-        return again.masks(frame, masks, trial)
+        return again.masks(frame, masks, trial, **known)
 
     spied = Again(pytest.fail, masks)
     assert regroup(first, prior, spied, SegmentConfig(), None, [STRANGE_ID]) is first
