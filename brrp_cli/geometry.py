@@ -39,6 +39,13 @@ def as_transforms(rotations: NDArray[np.float64]) -> NDArray[np.float64]:
     return T
 
 
+def turns_about(rotations: NDArray[np.float64], middle: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(K, 4, 4) matrices that turn about a point (3,) by rotations (K, 3, 3)."""
+    T = as_transforms(rotations)
+    T[:, :3, 3] = middle - rotations @ middle
+    return T
+
+
 def cells_of(points: NDArray[np.floating], cell: float) -> NDArray[np.int64]:
     """(n,) number, from 0 on and without gaps, of the grid cell of `cell` that each of points
     (n, d) lies in; in the order of the cells, the last coordinate fastest."""

@@ -8,7 +8,8 @@
 
 The made frame is that of `brrp demo`, its first four objects, with the starter prior. Every frame
 is first reconstructed once, then `--repeats` times: medians, least and greatest. Stages are those
-of one thread; the whole is timed with one thread and with `--workers`. The plain implementation
+of one thread; the whole is timed with one thread and with `--workers`, whose helper processes are
+ready by then, and their CPU counts, too. The plain implementation
 (tools/plain) gets all cores; a machine that is busy disturbs both, so read the ratios. `cold` is
 `brrp reconstruct FRAME` as a process of its own, imports included. Denormal numbers, which some
 processors multiply 20 times more slowly and others at full speed, are counted by the folder of
@@ -39,7 +40,7 @@ from speed.denormals import by_folder, watch_denormals
 from speed.frames import four_objects
 from speed.growth import cases
 from speed.machine import Machine, limits, measure_machine
-from speed.measure import cold_reconstruct, peak_megabytes, run, spread
+from speed.measure import cold_reconstruct, own_megabytes, peak_megabytes, run, spread
 from speed.sets import HEAD, frames_of, measure_set
 
 from brrp_cli.config import preset
@@ -143,15 +144,21 @@ def measure(
     alone = Reconstructor(prior, workers=1)
     many = Reconstructor(prior, workers=options.workers)
     alone(frame)
+    many(frame)
+    many.helpers.wait()
+    helpers = many.helpers.processes
     runs = [run(lambda: alone(frame)) for _ in range(options.repeats)]
     stages = {
         stage: spread([_seconds(each.result, stage) for each in runs])
         for stage in ("observation", *STAGES)
     }
-    threaded = [run(lambda: many(frame)) for _ in range(options.repeats)]
+    many(frame)
+    threaded = [run(lambda: many(frame), helpers) for _ in range(options.repeats)]
+    memory = [own_megabytes(process) for process in helpers]
+    many.close()
     wholes = {
         "1 thread": spread([each.wall for each in runs]),
-        f"{options.workers} threads": spread([each.wall for each in threaded]),
+        f"{options.workers} workers": spread([each.wall for each in threaded]),
         "CPU, 1 thread": spread([each.cpu for each in runs]),
         f"CPU, {options.workers}": spread([each.cpu for each in threaded]),
     }
@@ -174,6 +181,9 @@ def measure(
             f"  limit of {stage}: {limit.operations / 1e9:.2f} G operations and "
             f"{limit.bytes / 1e6:.0f} MB an object"
         )
+    if memory:
+        told = ", ".join(f"{each:.0f}" for each in memory)
+        click.echo(f"  MB that each helper process takes besides: {told}")
     with watch_denormals() as watched:
         alone(frame)
     denormals = by_folder(watched)
@@ -187,6 +197,7 @@ def measure(
         "whole": {key: value.as_dict() for key, value in wholes.items()},
         "limits": {stage: asdict(limit) for stage, limit in least.items()},
         "denormals": denormals,
+        "helper_megabytes": memory,
     }
     if plain:
         found["plain"] = {**plain, "cpu": plain_cpu, "objects_timed": options.plain_objects}

@@ -58,14 +58,15 @@ class VerificationConfig:
 class ColourConfig:
     """Which of the placements that depth cannot tell apart has the colours of the image.
 
-    The best placement is turned about each axis of its box in `turns` steps, both ways up; the best
-    are placed again, first those that are turned by `apart` radians from all better ones. Of those
-    whose alignment score is within `alike` of its own the one with the best sum of alignment score
-    and `worth` times the correlation of colours is taken, if that gains `gain`: a box that one buys
-    is not quite the one that was scanned. It counts in full from a standard deviation of `textured`
-    (of 255) on. Colours are means over cells of `cell` metres, of at most `vertices` vertices, of
-    which `least_seen` have to be within `near` metres of the measured depth; what differs by less
-    than `plain` (of 255) is of one colour. asked : whether any of this is done
+    The best placement is turned about each axis of its box and of its own in `turns` steps, both
+    ways up; the best are placed again, first those that are turned by `apart` radians from all
+    better ones. Of those whose alignment score is within `alike` of its own the one with the best
+    sum of alignment score and `worth` times the correlation of colours is taken, if that gains
+    `gain`: a box that one buys is not quite the one that was scanned. It counts in full from a
+    standard deviation of `textured` (of 255) on. Colours are means over cells of `cell` metres, of
+    at most `vertices` vertices, of which `least_seen` have to be within `near` metres of the
+    measured depth; what differs by less than `plain` (of 255) is of one colour. asked : whether any
+    of this is done
     """
 
     asked: bool = True
@@ -86,19 +87,26 @@ class ColourConfig:
 class TurnConfig:
     """Placements of an object that looks almost alike when it is turned (registration/turned.py).
 
-    Tried are `turns` turns about each axis of its box, both ways up, and `any_turns` of any kind,
-    under which the mean distance of `surface_points` of its surface from itself is less than
-    `itself`, metres. The `count` best of them by `coarse_points` observed points, first those that
+    Tried are `turns` turns about each axis of its box and of its own, both ways up, and `any_turns`
+    of any kind, each followed by `onto_itself_steps` steps that bring `surface_points` of its
+    surface onto itself from `onto_itself` metres, under which their mean distance from it is less
+    than `itself`, metres; of those within `same_turn` radians and `same_shift` metres of another
+    one is enough. The `count` best of them by `coarse_points` observed points, first those that
     are `apart` radians from all better ones, are refined, and the best `judged` held against
     `points` observed ones, without those whose mean distance on the coarse field is longer than the
     best one's by `worse` metres; distances beyond `far` metres count as that. One takes the place
     of the first if it is better by `gain` standard errors. Those that are worse by no more than
-    `undecided` standard errors, and in alignment score by no more than `alike`, are as probable.
+    `undecided` standard errors, in alignment score by no more than `alike`, and in the likelihood
+    of the frame by no more than `nats`, are as probable.
     """
 
     turns: int = 36
     any_turns: int = 200
     surface_points: int = 150
+    onto_itself: float = 0.01
+    onto_itself_steps: int = 4
+    same_turn: float = 0.08
+    same_shift: float = 0.002
     itself: float = 0.003
     count: int = 16
     judged: int = 8
@@ -108,7 +116,8 @@ class TurnConfig:
     points: int = 2000
     far: float = 0.005
     gain: float = 2.0
-    undecided: float = 2.0
+    undecided: float = 3.0
+    nats: float = 2.0
     alike: float = 0.1
 
 

@@ -72,6 +72,11 @@ class Helpers:
         """Whether one has started."""
         return any(helper.is_ready() for helper in list(self._helpers))
 
+    @property
+    def processes(self) -> list[int]:
+        """Their numbers, of those that started."""
+        return [helper.process for helper in list(self._helpers) if helper.process is not None]
+
     @contextmanager
     def lent(self) -> Iterator[Helper | None]:
         """One that is ready and has nothing to do; None where there is none."""
@@ -115,6 +120,11 @@ class Helper:
         except OSError as error:  # no memory, or no process left
             self._lose(error)
         theirs.close()
+
+    @property
+    def process(self) -> int | None:
+        """Its number; None where it did not start."""
+        return None if self._process is None else self._process.pid
 
     def is_ready(self, patience: float = 0.0) -> bool:
         """Whether it has started; waits for that so many seconds at most."""

@@ -17,8 +17,8 @@ from brrp_cli.methods.kin_hypotheses import KinHypothesis, kin_hypotheses
 from brrp_cli.methods.scene import Scene
 from brrp_cli.observation.ray_samples import ObjectObservation
 from brrp_cli.reconstruction import OK, ObjectReconstruction, Retrieved, Similar
-from brrp_cli.registration.likelihood import SeenObject, see
-from brrp_cli.registration.model import search_model
+from brrp_cli.registration.likelihood import SeenObject, evidence, log_likelihood, see
+from brrp_cli.registration.model import Model, search_model
 from brrp_cli.registration.pose_search import Hypothesis, search
 from brrp_cli.registration.refined import refined
 from brrp_cli.registration.scale_scan import observed_cloud
@@ -181,7 +181,12 @@ def reconstruct_by_hypotheses(
         for i in kept[kept < len(placed)]:
             placed[i] = refined(placed[i], verifier, wave, hypotheses, views.rays())
             if not views:
-                best = turned(placed[i], verifier, hypotheses.sensor.patch, hypotheses.search)
+                judge = partial(
+                    _log_likelihood, model=placed[i].model, seen=seen, config=hypotheses
+                )
+                best = turned(
+                    placed[i], verifier, hypotheses.sensor.patch, hypotheses.search, judge
+                )
                 if best.best is not placed[i]:
                     placed[i] = refined(best.best, verifier, wave, hypotheses, views.rays())
                 alike[i] = best.alike
@@ -231,6 +236,15 @@ def reconstruct_by_hypotheses(
         posterior=posterior,
         memory=memory,
     )
+
+
+def _log_likelihood(
+    T_cam_model: Array, model: Model, seen: SeenObject, config: HypothesesConfig
+) -> float:
+    """Of a placement, against that it is none of the stored objects, nats."""
+    likelihood = config.likelihood
+    found = evidence(T_cam_model, model, seen, likelihood, config.search.colour)
+    return log_likelihood(found, likelihood)
 
 
 def _shared_with_kin(weights: Array, like: list[KinHypothesis]) -> Array:

@@ -16,11 +16,15 @@ from scipy.spatial.transform import Rotation
 from brrp_cli.config import ColourConfig
 from brrp_cli.frames.frame import Frame
 from brrp_cli.frames.projection import pixel_numbers
-from brrp_cli.geometry import cells_of, transform_points
+from brrp_cli.geometry import cells_of, transform_points, turns_about
 from brrp_cli.prior.shape import StoredShape
 from brrp_cli.registration.model import Model
 
 Array = NDArray[np.float64]
+
+# Lengths of principal axes in this ratio or less are alike; axes that are turned from the box's by
+# less, radians, are the box's.
+ALIKE, ASKEW = 1.05, 0.05
 
 
 @cache
@@ -37,6 +41,25 @@ def turns_about_itself(turns: int) -> Array:
     rounded = np.round(every, 6) + 0.0
     first = np.unique(rounded.reshape(len(every), -1), axis=0, return_index=True)[1]
     return np.asarray(every[np.sort(first)])
+
+
+def about_main_axes(surface: Array, turns: int) -> Array:
+    """(K, 4, 4) turns of a model about the principal axes of its surface (n, 3), both ways up, for
+    those axes that are not alike and not the box's: a screwdriver that was scanned askew."""
+    middle = surface.mean(axis=0)
+    square, axes = np.linalg.eigh(np.cov((surface - middle).T))
+    length = np.sqrt(square)
+    angles = (np.arange(turns) * (2 * np.pi / turns))[:, None]
+    found = []
+    for i, axis in enumerate(axes.T):
+        others = np.delete(length, i)
+        alike = np.maximum(others, length[i]) / np.minimum(others, length[i]) < ALIKE
+        if alike.any() or np.abs(axis).max() > np.cos(ASKEW):
+            continue
+        turned = Rotation.from_rotvec(angles * axis)
+        over = Rotation.from_rotvec(np.pi * axes[:, i - 1])
+        found += [turned.as_matrix(), (turned * over).as_matrix()]
+    return turns_about(np.concatenate([np.zeros((0, 3, 3)), *found]), middle)
 
 
 def best_and_different(turns: Array, score: Array, count: int, apart: float) -> NDArray[np.int64]:

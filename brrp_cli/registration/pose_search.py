@@ -17,6 +17,7 @@ from brrp_cli.config import FeatureConfig, SearchConfig
 from brrp_cli.geometry import as_transforms, transform_points
 from brrp_cli.registration.begin import best_brought_nearer, best_of, brought_nearer, coarse_score
 from brrp_cli.registration.colour_pose import (
+    about_main_axes,
     best_and_different,
     textured_agreement,
     turns_about_itself,
@@ -139,11 +140,16 @@ def by_colour(
     model, colour = best.model, config.colour
     if not colour.asked or not model.stored.record.get("coloured"):
         return found
-    turns = turns_about_itself(colour.turns)
-    T = best.T_cam_model @ as_transforms(turns)
+    turns = np.concatenate(
+        [
+            as_transforms(turns_about_itself(colour.turns)),
+            about_main_axes(model.surface, colour.turns),
+        ]
+    )
+    T = best.T_cam_model @ turns
     score = coarse_score(T, model, verifier, config)
     T = brought_nearer(
-        T[best_and_different(turns, score, config.middle, colour.apart)],
+        T[best_and_different(turns[:, :3, :3], score, config.middle, colour.apart)],
         model,
         verifier,
         config.middle_points,
@@ -178,16 +184,24 @@ def _rotation(placed: Hypothesis) -> Rotation:
 def different(T_cam_model: Array, config: SearchConfig) -> Array:
     """Placements (B, 4, 4), best first, of one size, without those that are all but a better one:
     more steps would bring both to the same place."""
-    R, t = T_cam_model[:, :3, :3].reshape(-1, 9), T_cam_model[:, :3, 3]
+    return without_same(T_cam_model, config.same_turn, config.same_shift)
+
+
+def without_same(T: Array, turn: float, shift: float) -> Array:
+    """Placements (B, 4, 4), best first, of one size, without those that are turned from a better
+    one by less than `turn`, radians, and shifted by less than `shift`, metres."""
+    if not len(T):
+        return T
+    R, t = T[:, :3, :3].reshape(-1, 9), T[:, :3, 3]
     # The trace of the turn between two is 1 + 2 cos of its angle.
     trace = R @ R.T / (R[0] @ R[0] / 3)
-    shift = np.linalg.norm(t[:, None] - t, axis=2)
-    same = (trace > 1 + 2 * np.cos(config.same_turn)) & (shift < config.same_shift)
+    apart = np.linalg.norm(t[:, None] - t, axis=2)
+    same = (trace > 1 + 2 * np.cos(turn)) & (apart < shift)
     kept = np.ones(len(same), dtype=np.bool_)
     for row in range(len(same)):
         if kept[row]:
             kept[row + 1 :] &= ~same[row, row + 1 :]
-    return T_cam_model[kept]
+    return np.asarray(T[kept])
 
 
 def _distinct(found: list[Hypothesis], config: SearchConfig) -> list[Hypothesis]:

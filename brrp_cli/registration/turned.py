@@ -8,6 +8,7 @@ and what they cannot decide is kept.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cache
 from weakref import WeakKeyDictionary
@@ -20,11 +21,12 @@ from brrp_cli.config import SearchConfig, TurnConfig
 from brrp_cli.geometry import as_transforms, cells_of, transform_points
 from brrp_cli.prior.shape import StoredShape
 from brrp_cli.registration.colour_pose import (
+    about_main_axes,
     best_and_different,
     textured_agreement,
     turns_about_itself,
 )
-from brrp_cli.registration.pose_search import Hypothesis, different
+from brrp_cli.registration.pose_search import Hypothesis, different, without_same
 from brrp_cli.registration.sdf_refinement import refine_to_sdf
 from brrp_cli.registration.verification import Verifier
 from brrp_cli.seeds import child_rng
@@ -41,10 +43,17 @@ class Turned:
     alike: Array
 
 
-def turned(placed: Hypothesis, verifier: Verifier, patch: float, config: SearchConfig) -> Turned:
+def turned(
+    placed: Hypothesis,
+    verifier: Verifier,
+    patch: float,
+    config: SearchConfig,
+    judge: Callable[[Array], float],
+) -> Turned:
     """`placed`, or where it fits what was seen better, turned about itself; and what fits as well.
 
     patch : metres; pixels within one err together and are one vote
+    judge : log likelihood ratio, nats, of a placement T_cam_model (4, 4)
     """
     turn = config.about_itself
     start = _nearly_itself(placed, turn)
@@ -74,7 +83,11 @@ def turned(placed: Hypothesis, verifier: Verifier, patch: float, config: SearchC
     better = worse + turn.gain * doubt
     first = int(np.argmin(np.where(_as_much_alike(T, placed, verifier, config), better, np.inf)))
     worse, doubt = _worse_than(first, exact, points, patch)
-    alike = (worse <= turn.undecided * doubt) & (_angles(T, T[first]) >= turn.apart)
+    undecided = (worse <= turn.undecided * doubt) & (_angles(T, T[first]) >= turn.apart)
+    alike = np.flatnonzero(undecided)
+    if len(alike):
+        least = judge(T[first]) - turn.nats
+        alike = alike[[judge(T[row]) >= least for row in alike]]
     best = placed if first == 0 else replace(placed, T_cam_model=T[first])
     return Turned(best, np.asarray(T[alike]))
 
@@ -84,17 +97,23 @@ _TURNS: WeakKeyDictionary[StoredShape, tuple[TurnConfig, Array]] = WeakKeyDictio
 
 
 def _nearly_itself(placed: Hypothesis, config: TurnConfig) -> Array:
-    """(K, 4, 4) turns about the middle, by `config.apart` at least, that bring the surface back to
-    within `config.itself` of itself, on average. Of an object that is held it is found once."""
+    """(K, 4, 4) motions of the model, turns by `config.apart` at least, that bring its surface back
+    to within `config.itself` of itself, on average. Of an object that is held it is found once."""
     model = placed.model
     known = _TURNS.get(model.stored.shape)
     if known is not None and known[0] == config:
         return known[1]
     surface = model.surface[: config.surface_points]
-    every = _every_turn(config)
-    moved = np.einsum("kij,nj->kni", every, surface)
+    start = np.concatenate(
+        [as_transforms(_every_turn(config)), about_main_axes(model.surface, config.turns)]
+    )
+    # Scanned things do not lie quite along the axes of their boxes.
+    every = refine_to_sdf(start, surface, model, config.onto_itself, config.onto_itself_steps)
+    moved = np.einsum("kij,nj->kni", every[:, :3, :3], surface) + every[:, None, :3, 3]
     off = np.abs(model.signed_distance(moved.reshape(-1, 3))).reshape(len(every), -1).mean(axis=1)
-    found = as_transforms(every[off < config.itself])
+    good = (off < config.itself) & (_angles(every, np.eye(4)) >= config.apart)
+    found = every[good][np.argsort(off[good], kind="stable")]
+    found = without_same(found, config.same_turn, config.same_shift)
     _TURNS[model.stored.shape] = config, found
     return found
 

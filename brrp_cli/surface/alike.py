@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation, Slerp
 
 from brrp_cli.config import SurfaceConfig
+from brrp_cli.geometry import turns_about
 from brrp_cli.inference.placed_shape import PlacedShape
 
 Array = NDArray[np.float64]
@@ -39,13 +40,20 @@ def _free_turns(shape: PlacedShape, config: SurfaceConfig) -> Array:
     cosine = np.abs(axes @ axes.T)
     common = int(np.argmax((cosine > np.cos(config.one_axis)).sum(axis=1)))
     same = cosine[common] > np.cos(config.one_axis)
-    about = np.sort(np.append(angles[same] * np.sign(axes[same] @ axes[common]), 0.0))
+    about = np.sort(np.append(angles[same] * np.sign(axes[same] @ axes[common]), 0.0) % (2 * np.pi))
     gaps = np.diff(np.append(about, about[0] + 2 * np.pi))
-    if same.sum() < config.free_turns or gaps.min() > config.neighbours:
+    # Half turns about axes that all but agree are the same turn, and no step on the way round.
+    gaps = gaps[gaps > config.one_axis]
+    if len(gaps) <= config.free_turns or gaps.min() > config.neighbours:
         return np.empty((0, 4, 4))
     count = int(np.ceil(2 * np.pi / config.turn_step))
     every = 2 * np.pi / count * np.arange(1, count)
-    return _placed(start * Rotation.from_rotvec(every[:, None] * axes[common]), shape)
+    turns = Rotation.from_rotvec(every[:, None] * axes[common]).as_matrix()
+    # They turn about an axis that need not go through the middle of the shape's box.
+    T_shape_alike = np.linalg.inv(shape.T_cam_shape) @ shape.alike[same]
+    still = np.concatenate(np.eye(3) - T_shape_alike[:, :3, :3])
+    middle = np.linalg.lstsq(still, T_shape_alike[:, :3, 3].ravel(), rcond=0.1)[0]
+    return shape.T_cam_shape @ turns_about(turns, middle)
 
 
 def _between_neighbours(shape: PlacedShape, config: SurfaceConfig) -> Array:

@@ -10,6 +10,7 @@ from table_scene import MESHES, TABLE, in_camera, photograph, placed, stored
 from brrp_cli.config import ColourConfig, SearchConfig
 from brrp_cli.geometry import similarity, transform_points
 from brrp_cli.registration.colour_pose import (
+    about_main_axes,
     best_and_different,
     colour_agreement,
     textured_agreement,
@@ -96,3 +97,29 @@ def test_faint_colours_say_little_and_strong_ones_all(scene) -> None:
     model = replace(model, stored=replace(model.stored, shape=shape))
     assert colour_agreement(T, model, frame, CONFIG) > 0.8
     assert 0 < textured_agreement(T, model, frame, CONFIG) < 0.3
+
+
+def test_an_object_that_was_scanned_askew_turns_about_its_own_axes() -> None:
+    """A bar of a square section, off the middle: about its length, and end over end."""
+    rng = np.random.default_rng(0)
+    bar = rng.uniform(-1, 1, (4000, 3)) * [0.10, 0.01, 0.01]
+    askew = Rotation.from_rotvec([0.1, 0.2, 0.5])
+    shift = np.array([0.02, 0.0, 0.01])
+    T = about_main_axes(askew.apply(bar) + shift, 4)
+    assert len(T) == 8
+    # In the bar's own frame, about its own middle.
+    own = np.eye(4)
+    own[:3, :3], own[:3, 3] = askew.as_matrix(), shift
+    inside = np.linalg.inv(own) @ T @ own
+    along = inside[:, 0, 0]
+    np.testing.assert_allclose(np.abs(along), 1, atol=0.01)
+    assert (along > 0).sum() == (along < 0).sum() == 4
+    np.testing.assert_allclose(inside[:, :3, 3], 0, atol=0.003)
+
+
+def test_an_object_that_lies_along_its_box_has_no_other_axes() -> None:
+    rng = np.random.default_rng(0)
+    box = rng.uniform(-1, 1, (4000, 3)) * [0.10, 0.05, 0.02]
+    assert about_main_axes(box, 4).shape == (0, 4, 4)
+    ball = rng.normal(size=(4000, 3))
+    assert about_main_axes(ball / np.linalg.norm(ball, axis=1)[:, None], 4).shape == (0, 4, 4)

@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import numpy as np
 from scipy.spatial.transform import Rotation
-from table_scene import MESHES, TABLE, in_camera, photograph, placed, stored
+from table_scene import MESHES, PARAMETERS, TABLE, in_camera, photograph, placed, stored
 
 from brrp_cli.config import SearchConfig
 from brrp_cli.geometry import similarity
+from brrp_cli.prior.build.find_meshes import MeshSource
+from brrp_cli.prior.build.make_object import make_object
 from brrp_cli.registration.model import search_model
 from brrp_cli.registration.pose_search import Hypothesis
-from brrp_cli.registration.turned import turned
+from brrp_cli.registration.turned import _nearly_itself, turned
 from brrp_cli.registration.verification import Verifier
+from brrp_cli.shapes import solids
 
 CONFIG, PATCH = SearchConfig(), 0.01
 
@@ -28,6 +31,11 @@ def seen(name, noise=0.0005):
     return model, truth, Verifier(points, frame, TABLE)
 
 
+def undecided(T_cam_model):
+    """The frame does not tell placements apart, but for what the distances say."""
+    return 0.0
+
+
 def apart(T, truth):
     """Radians between two placements."""
     return Rotation.from_matrix((np.linalg.inv(truth) @ T)[:3, :3]).magnitude()
@@ -36,7 +44,7 @@ def apart(T, truth):
 def test_a_fruit_is_turned_to_where_its_dents_were_seen():
     model, truth, verifier = seen("fruit")
     wrong = truth @ similarity(rotation=Rotation.from_rotvec([0, 0, 2.0]).as_matrix())
-    found = turned(Hypothesis(model, wrong, 1.0, 0.9), verifier, PATCH, CONFIG)
+    found = turned(Hypothesis(model, wrong, 1.0, 0.9), verifier, PATCH, CONFIG, undecided)
     assert apart(found.best.T_cam_model, truth) < 0.1 < apart(wrong, truth)
     assert found.best.alignment_score == 0.9
     assert not len(found.alike), "what was seen tells the others apart"
@@ -45,18 +53,47 @@ def test_a_fruit_is_turned_to_where_its_dents_were_seen():
 def test_what_fits_stays_as_it_is():
     model, truth, verifier = seen("fruit")
     right = Hypothesis(model, truth, 1.0, 0.9)
-    assert turned(right, verifier, PATCH, CONFIG).best is right
+    assert turned(right, verifier, PATCH, CONFIG, undecided).best is right
 
 
 def test_nothing_is_like_an_ell():
     model, truth, verifier = seen("ell")
     right = Hypothesis(model, truth, 1.0, 0.9)
-    found = turned(right, verifier, PATCH, CONFIG)
+    found = turned(right, verifier, PATCH, CONFIG, undecided)
     assert found.best is right and found.alike.shape == (0, 4, 4)
 
 
 def test_a_box_may_as_well_stand_back_to_front():
     model, truth, verifier = seen("box")
-    found = turned(Hypothesis(model, truth, 1.0, 0.9), verifier, PATCH, CONFIG)
+    found = turned(Hypothesis(model, truth, 1.0, 0.9), verifier, PATCH, CONFIG, undecided)
     angles = np.array([apart(T, found.best.T_cam_model) for T in found.alike])
     assert len(angles) and (angles > 3.0).all()
+
+
+def test_a_thing_that_was_scanned_askew_is_turned_end_over_end_too(tmp_path):
+    """Stored meshes do not lie along the axes of their boxes; the turns that bring one back onto
+    itself are found all the same."""
+    askew = Rotation.from_rotvec([0.15, 0.1, 0.2]).as_matrix()
+    box = solids.box(0.16, 0.10, 0.05)
+    box.apply_transform(similarity(rotation=askew))
+    box.export(tmp_path / "askew.ply")
+    source = MeshSource("askew", tmp_path / "askew.ply", "askew.ply")
+    model = search_model(make_object(source, PARAMETERS))
+    found = _nearly_itself(Hypothesis(model, np.eye(4), 1.0, 0.9), CONFIG.about_itself)
+    halves = Rotation.from_matrix(found[:, :3, :3])
+    halves = halves[np.abs(halves.magnitude() - np.pi) < 0.05]
+    axes = np.abs(halves.as_rotvec() @ askew) / np.pi
+    for axis in np.eye(3):
+        assert np.abs(axes - axis).max(axis=1).min() < 0.05, axis
+
+
+def test_what_the_frame_speaks_against_is_not_as_probable():
+    """Colours, or a silhouette, know more than distances."""
+    model, truth, verifier = seen("box")
+
+    def judge(T_cam_model):
+        return -5.0 * (apart(T_cam_model, truth) > 3.0)
+
+    box = Hypothesis(model, truth, 1.0, 0.9)
+    assert len(turned(box, verifier, PATCH, CONFIG, undecided).alike)
+    assert not len(turned(box, verifier, PATCH, CONFIG, judge).alike)

@@ -86,3 +86,24 @@ def test_a_surface_of_a_coarse_grid_is_moved_out_to_its_reach():
     assert after.min() > 0.0009 and np.mean(after > 0.00099) > 0.999
     stay = distance > 0.001
     assert moved[stay] == pytest.approx(found.vertices[stay], abs=1e-9)
+
+
+def test_a_free_turn_goes_about_its_own_axis_and_not_that_of_the_box():
+    shape = with_turns("beaker", [0, 0, 40], [0, 0, -60], [0, 0, 110])
+    # The axis stands 20 mm beside the middle of the shape's box.
+    middle = np.array([0.02, 0.0, 0.0]) / shape.unit
+    inside = np.linalg.inv(shape.T_cam_shape) @ shape.alike
+    inside[:, :3, 3] = middle - inside[:, :3, :3] @ middle
+    shape = replace(shape, alike=shape.T_cam_shape @ inside)
+    every = np.linalg.inv(shape.T_cam_shape) @ every_alike(shape, CONFIG)
+    still = every[:, :3, :3] @ middle + every[:, :3, 3]
+    assert len(every) > 20
+    np.testing.assert_allclose(still, np.tile(middle, (len(every), 1)), atol=1e-6)
+
+
+def test_half_turns_about_nearly_the_same_axis_are_no_free_turn():
+    """A can on its head, turned as it may be, does not roll."""
+    about = [[np.cos(angle), np.sin(angle), 0.0] for angle in (0.0, 0.06, 0.12)]
+    shape = with_turns("beaker", *(180 * np.array(about)))
+    vectors = vectors_of(shape, every_alike(shape, CONFIG))
+    assert (np.linalg.norm(vectors, axis=1) > 150).all()

@@ -82,10 +82,14 @@ def measure_set(
     """Every frame `repeats` times after a first one. Errors: BrrpError."""
     alone, many = Reconstructor(prior, workers=1), Reconstructor(prior, workers=workers)
     results = [many(frame) for frame in frames]
+    # A first round for the helpers, which have started by then.
+    many.helpers.wait()
+    results = [many(frame) for frame in frames]
     counts = [len(result.objects) for result in results]
     threaded = [[run(lambda f=frame: many(f)) for _ in range(repeats)] for frame in frames]
     walls = [float(np.median([each.wall for each in runs])) for runs in threaded]
     masks = [each.result.seconds.get("masks", 0.0) for runs in threaded for each in runs]
+    many.close()
     for frame in frames:
         alone(frame)
     quiet = [run(lambda f=frame: alone(f)).cpu for frame in frames]
