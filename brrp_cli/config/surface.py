@@ -19,8 +19,9 @@ class SurfaceConfig:
     `spacing`.
     around_nodes : of the grid on which the confidence surface around a stored mesh is found, whose
     spacing is `around_finest` metres at least
-    fidelity : metres, standard deviation of a stored mesh from its object; band_draws : of the
-    pose, from which the width of the band around it follows, looked at in `band_vertices` vertices
+    fidelity : metres, standard deviation of a stored mesh from its object; pose_share : of what the
+    covariance of its pose says, that counts; band_draws : of the pose, from which the width of the
+    band around it follows, looked at in `band_vertices` vertices
     Placements that are as probable as the best one are turned by steps of `turn_step` radians:
     between neighbours that are turned by `neighbours` radians at most, and all around an axis that
     `free_turns` of them share to within `one_axis` radians, where any two are such neighbours; how
@@ -54,7 +55,8 @@ class SurfaceConfig:
     farthest: float = 0.004
     wall_share: float = share(0.4)
     steps: int = 17
-    fidelity: float = 0.0002
+    fidelity: float = 0.00025
+    pose_share: float = share(0.9)
     band_draws: int = 4_000
     band_vertices: int = 300
     around_nodes: int = 1_000_000

@@ -36,7 +36,7 @@ MOST_LOST = 3
 
 
 class LostError(Exception):
-    """A helper died or hung: the work is still to be done."""
+    """A helper died, hung, or cannot do it: the work is still to be done."""
 
 
 class Helpers:

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any, Protocol, TypeVar
 
+from brrp_cli.errors import PriorError
 from brrp_cli.executors.helpers import Helpers, LostError, shared
 from brrp_cli.methods.base import Method
 from brrp_cli.methods.scene import Scene
 from brrp_cli.prior.by_name import from_bytes, to_bytes
 from brrp_cli.threads import cores
+
+log = logging.getLogger(__name__)
 
 # Each has the libraries in memory, 300 MB and more.
 MOST = 3
@@ -52,9 +56,14 @@ def shared_work(
     if helpers is None or not helpers.any_ready or common.scene.device != "cpu":
         yield lambda *args: do(common, *args)
         return
+    prior, known = common.scene.prior, _known(common)
     with ExitStack() as stack:
-        prior, known = common.scene.prior, _known(common)
-        path = str(stack.enter_context(shared(to_bytes(common, prior))))
+        try:
+            path = str(stack.enter_context(shared(to_bytes(common, prior))))
+        except OSError as error:  # no room for it
+            log.info("Helpers are left out: %r", error)
+            yield lambda *args: do(common, *args)
+            return
 
         def call(*args: Any) -> R:
             with helpers.lent() as helper:
@@ -82,6 +91,10 @@ def _there(do: Callable[..., Any], path: str, args: tuple[Any, ...]) -> bytes:
     """In a helper, which does one thing at a time."""
     global _last
     if _last is None or _last[0] != path:
-        _last = path, from_bytes(Path(path).read_bytes())
+        try:
+            _last = path, from_bytes(Path(path).read_bytes())
+        except (OSError, PriorError) as error:
+            # Who opened the prior before it was changed can still use it.
+            raise LostError(repr(error)) from error
     common = _last[1]
     return to_bytes(do(common, *args), common.scene.prior, _known(common))

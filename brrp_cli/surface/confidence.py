@@ -150,7 +150,7 @@ def _around_stored_mesh(
     if best.off > config.most_off:
         return None
     shape = placed(posterior, number)
-    by_pose = simultaneous(shape, confidence, config) * shape.deviations
+    by_pose = config.pose_share * simultaneous(shape, confidence, config) * shape.deviations
     band = np.hypot(by_pose, ndtri((1 + confidence) / 2) * config.fidelity)
     moved = np.einsum("ni,ni->n", best.vertices - through.vertices, through.normals)
     # Where a vertex is a corner, its faces move by less than itself.

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import errno
 import os
+import tempfile
 import threading
+from dataclasses import replace
 from types import SimpleNamespace
 
 import for_helpers
@@ -85,6 +88,25 @@ def test_what_a_helper_dies_of_is_done_here(common, helpers):
     with shared_work(for_helpers.here_or_there, common, helpers) as do:
         assert do("die", 3)[:2] == (False, 3)
         assert do("work", 4)[:2] == (False, 4), "it is gone"
+
+
+def test_a_helper_that_cannot_open_the_prior_leaves_the_work_here(common, helpers, prior):
+    """It was built again meanwhile; who has opened it before goes on."""
+    changed = replace(prior, index=replace(prior.index, digest="0" * 64))
+    scene = SimpleNamespace(**{**vars(common.scene), "prior": changed})
+    with shared_work(for_helpers.here_or_there, replace(common, scene=scene), helpers) as do:
+        assert do("work", 5)[:2] == (False, 5)
+    with shared_work(for_helpers.here_or_there, common, helpers) as do:
+        assert do("work", 6)[:2] == (True, 6)
+
+
+def test_without_room_for_what_is_shared_the_work_is_done_here(common, helpers, monkeypatch):
+    def full(*_, **__):
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(tempfile, "NamedTemporaryFile", full)
+    with shared_work(for_helpers.here_or_there, common, helpers) as do:
+        assert do("work", 5)[:2] == (False, 5)
 
 
 def test_errors_are_those_of_the_work(common, helpers):
