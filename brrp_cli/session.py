@@ -184,7 +184,9 @@ class Reconstructor:
         left = self._only(was.keys() - {item.object_id for item in new})
         if stream is not None:
             self._remember(result.frame, new, stream.config)
-        self._made = [(result.frame, replace(result, objects=new)), *left] if new else left
+        # What only other masks of the same image ask for is not kept.
+        newest = replace(result, objects=new, image=None)
+        self._made = [(result.frame, newest), *left] if new else left
         next_id = max(followed.next_id, max(result.frame.object_ids) + 1)
         self._last = Followed(result.frame, next_id)
         return result
