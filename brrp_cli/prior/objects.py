@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -50,7 +51,7 @@ class PriorObject:
     labels: NDArray[np.bool_]
     surface: NDArray[np.float32]
     surface_normals: NDArray[np.float32]
-    clouds: dict[float, FeatureCloud]
+    clouds: Mapping[float, FeatureCloud]
     poses: list[RestingPose]
     record: dict[str, Any]
     appearance: Appearance

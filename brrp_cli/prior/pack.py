@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping
 from dataclasses import fields
 from typing import Any
 
@@ -55,9 +56,6 @@ def unpack(stored: StoredObject, description: str) -> PriorObject:
     """As it is used: float64 clouds by scale, unit normals, labels as bool."""
     arrays = stored.arrays
     lower, upper = arrays["box"]
-    points, fpfh = (arrays[k].astype(np.float64) for k in ("cloud_points", "cloud_fpfh"))
-    normals = normalise(arrays["cloud_normals"].astype(np.float64))
-    starts = arrays["cloud_starts"]
     return PriorObject(
         name=stored.name,
         description=description,
@@ -67,10 +65,7 @@ def unpack(stored: StoredObject, description: str) -> PriorObject:
         labels=arrays["labels"].astype(bool),
         surface=arrays["surface"],
         surface_normals=arrays["surface_normals"],
-        clouds={
-            float(scale): FeatureCloud(points[a:b], normals[a:b], fpfh[a:b])
-            for scale, a, b in zip(arrays["scales"], starts[:-1], starts[1:], strict=True)
-        },
+        clouds=_Clouds(arrays),
         poses=[
             RestingPose(T, float(p))
             for T, p in zip(arrays["pose_T"], arrays["pose_probability"], strict=True)
@@ -81,6 +76,30 @@ def unpack(stored: StoredObject, description: str) -> PriorObject:
         ),
         shape=_unpack_shape(arrays),
     )
+
+
+class _Clouds(Mapping[float, FeatureCloud]):
+    """Clouds by scale, each made as it is asked for: of an object's ten, searches take one, and in
+    double precision they are four times as large as stored."""
+
+    def __init__(self, arrays: dict[str, NDArray[Any]]) -> None:
+        self._stored = [arrays[f"cloud_{key}"] for key in ("points", "normals", "fpfh")]
+        starts = arrays["cloud_starts"].tolist()
+        self._rows = {
+            float(scale): slice(a, b)
+            for scale, a, b in zip(arrays["scales"], starts[:-1], starts[1:], strict=True)
+        }
+
+    def __getitem__(self, scale: float) -> FeatureCloud:
+        rows = self._rows[scale]
+        points, normals, fpfh = (each[rows].astype(np.float64) for each in self._stored)
+        return FeatureCloud(points, normalise(normals), fpfh)
+
+    def __iter__(self) -> Iterator[float]:
+        return iter(self._rows)
+
+    def __len__(self) -> int:
+        return len(self._rows)
 
 
 def _unpack_shape(arrays: dict[str, NDArray[Any]]) -> StoredShape:
