@@ -1,10 +1,13 @@
 """Reconstruct frame after frame in one process, and tell whether its memory stays flat.
 
     python tools/soak.py frame.npz other.npz --prior prior/ --frames 500
+    python tools/soak.py frame.npz other.npz --prior prior/ --helpers 1
 
-The frames are taken in turn, each with another seed, and read from their files each time. After
-every tenth the memory that the process holds is printed. Ends with 1 if the last quarter holds more
-than the second by over 5 % or 20 MB, whichever is more: what is loaded once is loaded by then.
+The frames are taken in turn, each with another seed, and read from their files each time. With
+--helpers they are those of one session, with one seed, and what its helper processes hold for
+themselves counts, too. After every tenth the memory that is held is told. Ends with 1 if the last
+quarter holds more than the second by over 5 % or 20 MB, whichever is more: what is loaded once is
+loaded by then.
 """
 
 from __future__ import annotations
@@ -18,6 +21,11 @@ from pathlib import Path
 
 import click
 import numpy as np
+
+# The script also runs from a checkout that is not installed.
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+from speed.measure import own_megabytes
 
 SHARE, MEGABYTES = 0.05, 20.0
 
@@ -45,26 +53,38 @@ def is_flat(samples: list[float]) -> bool:
 @click.option("--prior", type=click.Path(path_type=Path), help="Without one: V-PRISM.")
 @click.option("--preset", default="default", show_default=True)
 @click.option("--frames", "count", default=500, show_default=True, type=click.IntRange(4))
-def main(frames: tuple[Path, ...], prior: Path | None, preset: str, count: int) -> None:
+@click.option("--helpers", default=0, show_default=True, type=click.IntRange(0))
+def main(
+    frames: tuple[Path, ...], prior: Path | None, preset: str, count: int, helpers: int
+) -> None:
     """See above."""
-    from brrp_cli import load_frame, open_prior, reconstruct
+    from brrp_cli import Reconstructor, load_frame, open_prior, reconstruct
     from brrp_cli.config import preset as chosen
 
     opened = None if prior is None else open_prior(prior)
+    if helpers and opened is None:
+        raise click.UsageError("--helpers goes with --prior")
+    session = None
+    if helpers:
+        session = Reconstructor(opened, config=chosen(preset), workers=helpers + 1, helpers=helpers)
     samples, statuses = [], set()
     start = time.perf_counter()
     for number, path in enumerate(islice(cycle(frames), count)):
-        result = reconstruct(
-            load_frame(path),
-            opened,
-            method="vprism" if opened is None else "brrp",
-            config=chosen(preset),
-            seed=number,
-        )
+        if session is not None:
+            result = session(load_frame(path))
+        else:
+            result = reconstruct(
+                load_frame(path),
+                opened,
+                method="vprism" if opened is None else "brrp",
+                config=chosen(preset),
+                seed=number,
+            )
         statuses |= {item.status for item in result.objects}
         del result
         gc.collect()
-        samples.append(held())
+        others = [] if session is None else session.helpers.processes
+        samples.append(held() + sum(map(own_megabytes, others)))
         if number % 10 == 9:
             click.echo(
                 f"{number + 1:5d}  {samples[-1]:7.1f} MB  {time.perf_counter() - start:7.0f} s"
