@@ -77,7 +77,7 @@ def main(
                 load_frame(path),
                 opened,
                 method="vprism" if opened is None else "brrp",
-                config=chosen(preset),
+                config=None if opened is None else chosen(preset),
                 seed=number,
             )
         statuses |= {item.status for item in result.objects}
