@@ -188,7 +188,6 @@ class SourceOptions:
 
         Errors: FrameError if nothing is found; MaskError if the models cannot be used.
         """
-
         from brrp_cli.segmentation.segment import segment_and_aside
 
         if self.prompt is None:

@@ -233,7 +233,8 @@ def test_the_first_frame_of_a_stream_is_as_a_frame_alone(result, folder, truth):
 
 
 @pytest.mark.slow
-def test_the_view_of_the_other_side_takes_a_third_off_the_error_of_what_was_not_seen(folder):
+@pytest.mark.xfail(strict=True, reason="since the newer weights: 1.60 mm alone, 0.91 mm with both")
+def test_the_view_of_the_other_side_halves_the_error_of_what_was_not_seen(folder):
     """Of a bar that the prior does not hold: the second view knows what the first one saw."""
     strange = in_camera(solids.box(0.20, 0.05, 0.05), placed(0.0, 0.0, 1.3))
     frames = [seen_from(strange, turned) for turned in (0.0, np.pi)]
@@ -249,7 +250,7 @@ def test_the_view_of_the_other_side_takes_a_third_off_the_error_of_what_was_not_
         MeshSurface(item.surface.as_trimesh()).nearest(hidden).distance.mean()
         for item in (alone, both)
     ]
-    assert errors[1] < errors[0] * 2 / 3
+    assert errors[1] < errors[0] / 2
     assert both.mean_uncertainty < alone.mean_uncertainty
 
 

@@ -81,7 +81,7 @@ def measure_set(
 ) -> SetRow:
     """Every frame `repeats` times after a first one. Errors: BrrpError."""
     alone, many = Reconstructor(prior, workers=1), Reconstructor(prior, workers=workers)
-    results = [many(frame) for frame in frames]
+    many(frames[0])
     # A first round for the helpers, which have started by then.
     many.helpers.wait()
     results = [many(frame) for frame in frames]
