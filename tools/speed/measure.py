@@ -69,7 +69,8 @@ def _cpu_of(processes: Sequence[int]) -> float:
 def own_megabytes(process: int) -> float:
     """What a process holds in memory that it shares with no other."""
     lines = Path(f"/proc/{process}/smaps_rollup").read_text().splitlines()
-    return sum(int(line.split()[1]) for line in lines if line.startswith("Private_")) / 1000
+    kibibytes = sum(int(line.split()[1]) for line in lines if line.startswith("Private_"))
+    return kibibytes * 1024 / 1e6
 
 
 @dataclass(frozen=True)
