@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brrp_cli.dependencies import import_open3d
+from brrp_cli.distance_loops import distances, distances_and_gradients
 from brrp_cli.prior.parameters import FieldConfig
 
 if TYPE_CHECKING:
@@ -53,69 +54,13 @@ class DistanceField:
 
     def distance(self, points: NDArray[np.float32]) -> NDArray[np.float32]:
         """`signed_distance` (n,) at points (3, n), in single precision."""
-        (x, y, z), low, rise, off = self._corners(points)
-        edges = [up * z + start for start, up in zip(low, rise, strict=True)]
-        near = (edges[1] - edges[0]) * y + edges[0]
-        value = ((edges[3] - edges[2]) * y + edges[2] - near) * x + near
-        beyond = np.flatnonzero(off.any(axis=0))
-        if len(beyond):
-            value[beyond] += np.linalg.norm(off[:, beyond], axis=0) * np.float32(self.spacing)
-        return np.asarray(value)
+        return distances(self.values, self.lower, self.spacing, points)
 
     def distance_and_gradient(
         self, points: NDArray[np.float32]
     ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
         """Distance (n,) at points (3, n), as `signed_distance` has it, and its gradient (3, n)."""
-        (x, y, z), low, rise, off = self._corners(points)
-        edges = [start + z * up for start, up in zip(low, rise, strict=True)]
-        left, right = edges[1] - edges[0], edges[3] - edges[2]
-        near, far = edges[0] + y * left, edges[2] + y * right
-        up_near, up_far = rise[0] + y * (rise[1] - rise[0]), rise[2] + y * (rise[3] - rise[2])
-        slope = np.empty((3, len(x)), np.float32)
-        np.subtract(far, near, out=slope[0])
-        value = near + x * slope[0]
-        np.add(left, x * (right - left), out=slope[1])
-        np.add(up_near, x * (up_far - up_near), out=slope[2])
-        slope /= np.float32(self.spacing)
-        beyond = np.flatnonzero(off.any(axis=0))
-        if len(beyond):
-            off = off[:, beyond]
-            way = np.linalg.norm(off, axis=0)
-            value[beyond] += way * np.float32(self.spacing)
-            slope[:, beyond] = np.where(off != 0, off / way, slope[:, beyond])
-        return value, slope
-
-    def _corners(
-        self, points: NDArray[np.float32]
-    ) -> tuple[
-        NDArray[np.floating], list[NDArray[np.float32]], list[NDArray[np.float32]], NDArray[Any]
-    ]:
-        """Of the cells that hold points (3, n): how far along it each lies (3, n), values at the
-        four lower corners, (n,) each, along y, then x; how much more those above them are; and how
-        far off the grid each lies (3, n), in spacings."""
-        shape = np.array(self.values.shape, dtype=np.int32)[:, None]
-        at = points - self.lower[:, None].astype(np.float32)
-        at /= np.float32(self.spacing)
-        within = np.clip(at, 0, (shape - 1).astype(np.float32))
-        cell = within.astype(np.int32)
-        np.minimum(cell, shape - 2, out=cell)
-        on_x, on_y = int(shape[1, 0] * shape[2, 0]), int(shape[2, 0])
-        # What `take` takes without a copy.
-        first = (cell[0] * on_x + cell[1] * on_y + cell[2]).astype(np.intp)
-        nodes = self.values.ravel()
-        # Along z, then y, then x; the slope along an axis is the difference along it.
-        low, rise = [], []
-        for step in (0, on_y, on_x, on_x + on_y):
-            corner = first + step
-            low.append(nodes.take(corner))
-            corner += 1
-            above = nodes.take(corner)
-            above -= low[-1]
-            rise.append(above)
-        at -= within
-        # Less the whole numbers as floats: with integers, NumPy would go on in double precision.
-        within -= cell.astype(np.float32)
-        return within, low, rise, at
+        return distances_and_gradients(self.values, self.lower, self.spacing, points)
 
 
 def distance_field(mesh: trimesh.Trimesh, config: FieldConfig) -> DistanceField:

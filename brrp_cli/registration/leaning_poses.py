@@ -11,88 +11,83 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from brrp_cli.config import SearchConfig
-from brrp_cli.geometry import as_transforms, normalise
-from brrp_cli.observation.support_plane import Plane
+from brrp_cli.geometry import as_transforms
+from brrp_cli.registration.initial_poses import resting_initial_poses
 from brrp_cli.registration.model import ModelGeometry
+from brrp_cli.registration.outline import Footprint, Outline, principal_axes
+from brrp_cli.registration.side_loops import facing_boxes
 
 Array = NDArray[np.float64]
 
 
+def resting_and_leaning(model: ModelGeometry, seen: Outline, config: SearchConfig) -> Array:
+    """T_cam_model (B, 4, 4): the model resting on the plane, if there is one, and leaning."""
+    resting = np.zeros((0, 4, 4))
+    if seen.footprint is not None:
+        resting = resting_initial_poses(model, seen.footprint, config)
+    return np.concatenate([resting, leaning_poses(model, resting, seen, config)])
+
+
 def leaning_poses(
-    model: ModelGeometry, resting: Array, seen: Array, plane: Plane | None, config: SearchConfig
+    model: ModelGeometry, resting: Array, seen: Outline, config: SearchConfig
 ) -> Array:
     """T_cam_model (B, 4, 4): resting poses (b, 4, 4) raised to the top of what is seen, principal
-    axes laid over those of what is seen, and the model in all ways turned.
-
-    seen : (n, 3) points, metres, camera frame, in random order
-    """
-    principal = principal_poses(model, seen[: config.box_points])
+    axes laid over those of what is seen, and the model in all ways turned."""
+    principal = principal_poses(model, seen)
     turned = np.concatenate([spread_rotations(config.rotations), principal[:, :3, :3]])
     poses = [principal, turned_poses(turned, model, seen, config)]
-    if plane is not None:
-        poses.insert(0, raised_poses(resting, model, seen, plane, config))
+    if seen.footprint is not None:
+        poses.insert(0, raised_poses(resting, model, seen.footprint, config))
     return np.concatenate(poses)
 
 
 def raised_poses(
-    resting: Array, model: ModelGeometry, seen: Array, plane: Plane, config: SearchConfig
+    resting: Array, model: ModelGeometry, footprint: Footprint, config: SearchConfig
 ) -> Array:
-    """Those of the resting poses T_cam_model (B, 4, 4) whose top is lower than that of the seen
-    points (n, 3) by more than `hidden`, raised to it: an object that lies on others."""
-    top = np.quantile(plane.signed_distance(seen), 1 - config.stray)
+    """Those of the resting poses T_cam_model (B, 4, 4) whose top is lower than that of what is seen
+    by more than `hidden`, raised to it: an object that lies on others."""
+    plane = footprint.plane
     up = plane.normal @ resting[:, :3, :3]
     reached = (up @ model.surface.T).max(axis=1)
-    missing = top - reached - plane.signed_distance(resting[:, :3, 3])
+    missing = footprint.top - reached - plane.signed_distance(resting[:, :3, 3])
     raised = resting.copy()
     raised[:, :3, 3] += missing[:, None] * plane.normal
     return raised[missing > config.hidden]
 
 
-def principal_poses(model: ModelGeometry, seen: Array) -> Array:
-    """T_cam_model (24, 4, 4) that lay the model's principal axes along those of seen points (n, 3),
-    in every order and sense, middle on middle: an object that leans on others."""
-    middle, own = seen.mean(axis=0), model.surface.mean(axis=0)
+def principal_poses(model: ModelGeometry, seen: Outline) -> Array:
+    """T_cam_model (24, 4, 4) that lay the model's principal axes along those of what is seen, in
+    every order and sense, middle on middle: an object that leans on others."""
+    own = model.surface.mean(axis=0)
     T = np.tile(np.eye(4), (len(_CUBE), 1, 1))
-    T[:, :3, :3] = _axes(seen - middle) @ _CUBE @ _axes(model.surface - own).T
-    T[:, :3, 3] = middle - T[:, :3, :3] @ own
+    T[:, :3, :3] = seen.axes @ _CUBE @ principal_axes(model.surface - own).T
+    T[:, :3, 3] = seen.centre - T[:, :3, :3] @ own
     return T
 
 
-def _axes(points: Array) -> Array:
-    """Principal axes (3, 3), the columns, right-handed, of points (n, 3) about their middle."""
-    axes = np.linalg.eigh(points.T @ points)[1]
-    axes[:, 2] *= np.linalg.det(axes)
-    return axes
-
-
 def turned_poses(
-    rotations: Array, model: ModelGeometry, seen: Array, config: SearchConfig
+    rotations: Array, model: ModelGeometry, seen: Outline, config: SearchConfig
 ) -> Array:
     """T_cam_model (b, 4, 4) of the model turned in some ways: what leans on others.
 
     rotations : (b, 3, 3), from the model's axes to the camera's
-    seen : (n, 3), metres, camera frame, in random order
 
-    The box of the side that faces the camera is laid over the box of the seen points across the
-    line of sight, and its nearest point to theirs along it.
+    The box of the side that faces the camera is laid over the box of what is seen across the line
+    of sight, and its nearest point to the nearest one along it.
     """
-    ahead = normalise(seen.mean(axis=0))
-    # Two directions across the line of sight, and it.
-    T_sight_cam = np.stack([*np.linalg.svd(ahead[None])[2][1:], ahead])
-    low, high = np.quantile(
-        seen[: config.box_points] @ T_sight_cam.T, [config.stray, 1 - config.stray], axis=0
+    nearest, furthest = facing_boxes(
+        seen.T_sight_cam @ rotations,
+        model.surface[: config.model_points],
+        model.normals[: config.model_points],
     )
-    turned = T_sight_cam @ rotations
-    placed = turned @ model.surface[: config.model_points].T
-    facing = turned[:, 2] @ model.normals[: config.model_points].T < 0
-    nearest = np.where(facing[:, None], placed, np.inf).min(axis=-1)
-    furthest = np.where(facing[:, None], placed, -np.inf).max(axis=-1)
-    shift = (low + high) / 2 - (nearest + furthest) / 2
-    shift[:, 2] = low[2] - nearest[:, 2]
-    T = as_transforms(rotations)
-    T[:, :3, 3] = shift @ T_sight_cam
     # A model none of whose points faces the camera cannot be laid over anything.
-    return np.asarray(T[facing.any(axis=1)])
+    faces = np.isfinite(nearest[:, 0])
+    nearest, furthest = nearest[faces], furthest[faces]
+    shift = (seen.low + seen.high) / 2 - (nearest + furthest) / 2
+    shift[:, 2] = seen.low[2] - nearest[:, 2]
+    T = as_transforms(rotations[faces])
+    T[:, :3, 3] = shift @ seen.T_sight_cam
+    return T
 
 
 @lru_cache(maxsize=4)

@@ -21,6 +21,16 @@ class ModelGeometry(Protocol):
     mesh."""
 
     @property
+    def field(self) -> DistanceField:
+        """Signed distances, normalised."""
+        ...
+
+    @property
+    def half_extent(self) -> float:
+        """Metres for a normalised unit."""
+        ...
+
+    @property
     def surface(self) -> Array:
         """(n, 3), metres."""
         ...
@@ -99,6 +109,16 @@ class Model:
         return self._bare.distance_and_gradient(points)
 
     @property
+    def field(self) -> DistanceField:
+        """As that of `BareModel`."""
+        return self.stored.shape.field
+
+    @property
+    def half_extent(self) -> float:
+        """As that of `BareModel`."""
+        return self.stored.half_extent
+
+    @property
     def T_model_object(self) -> Array:
         """(4, 4), from the stored object's normalised coordinates."""
         return similarity(scale=self.stored.half_extent)
@@ -111,8 +131,7 @@ class Model:
 
     @property
     def _bare(self) -> BareModel:
-        stored = self.stored
-        return BareModel(stored.shape.field, stored.half_extent, self.surface, self.normals, [])
+        return BareModel(self.field, self.half_extent, self.surface, self.normals, [])
 
 
 def search_model(stored: PriorObject) -> Model:

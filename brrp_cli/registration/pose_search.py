@@ -22,8 +22,8 @@ from brrp_cli.registration.colour_pose import (
     textured_agreement,
     turns_about_itself,
 )
-from brrp_cli.registration.initial_poses import feature_matched_poses, resting_initial_poses
-from brrp_cli.registration.leaning_poses import leaning_poses
+from brrp_cli.registration.initial_poses import feature_matched_poses
+from brrp_cli.registration.leaning_poses import resting_and_leaning
 from brrp_cli.registration.model import Model
 from brrp_cli.registration.scale_scan import ObservedCloud
 from brrp_cli.registration.sdf_refinement import refine_to_sdf
@@ -101,12 +101,8 @@ def _initial_poses(
     matched = feature_matched_poses(
         model, observed, features, config.matching, config.matchings, seed
     )
-    points, plane = verifier.points, verifier.plane
-    resting = np.zeros((0, 4, 4))
-    if plane is not None:
-        resting = resting_initial_poses(model, points, plane, config)
-    leaning = leaning_poses(model, resting, points, plane, config)
-    return np.concatenate([np.stack(matched), resting, leaning])
+    every = resting_and_leaning(model, verifier.outline(config), config)
+    return np.concatenate([np.stack(matched), every])
 
 
 def start_from(

@@ -15,8 +15,7 @@ from numpy.typing import NDArray
 
 from brrp_cli.config import SearchConfig
 from brrp_cli.registration.begin import best_brought_nearer, best_of, brought_nearer
-from brrp_cli.registration.initial_poses import resting_initial_poses
-from brrp_cli.registration.leaning_poses import leaning_poses
+from brrp_cli.registration.leaning_poses import resting_and_leaning
 from brrp_cli.registration.model import ModelGeometry
 from brrp_cli.registration.verification import Verifier
 
@@ -75,16 +74,13 @@ def finely(
 
 
 def first_placements(model: ModelGeometry, verifier: Verifier, config: SearchConfig) -> Aligned:
-    """The `begun` best of all ways to lay a model over what is seen, brought nearer, on a plane
-    that `verifier` must have: resting, raised, leaning.
+    """The `begun` best of all ways to lay a model over what is seen, brought nearer: resting,
+    raised, leaning.
 
     Where they begin tells little. Of 299 true objects one in three begins within 0.1 of the score
     that it can reach, and nine in ten come there in these few steps.
     """
-    assert verifier.plane is not None
-    resting = resting_initial_poses(model, verifier.points, verifier.plane, config)
-    leaning = leaning_poses(model, resting, verifier.points, verifier.plane, config)
-    T = np.concatenate([resting, leaning])
+    T = resting_and_leaning(model, verifier.outline(config), config)
     T, _ = best_of(T, model, verifier, config, config.begun, config.first_share)
     return Aligned(*best_brought_nearer(T, model, verifier, config))
 

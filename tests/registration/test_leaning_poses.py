@@ -17,8 +17,10 @@ from brrp_cli.registration.leaning_poses import (
     turned_poses,
 )
 from brrp_cli.registration.model import search_model
+from brrp_cli.registration.outline import outline
 
 CONFIG = SearchConfig()
+WHOLE = SearchConfig(box_points=10**6)
 
 
 @pytest.fixture(scope="module")
@@ -31,7 +33,8 @@ def test_principal_axes_give_the_pose_of_a_whole_surface(models):
     T_cam_model = np.eye(4)
     T_cam_model[:3, :3] = Rotation.from_euler("xyz", [0.4, -1.1, 2.0]).as_matrix()
     T_cam_model[:3, 3] = 0.1, -0.2, 0.8
-    found = principal_poses(model, transform_points(T_cam_model, model.surface))
+    surface = transform_points(T_cam_model, model.surface)
+    found = principal_poses(model, outline(surface, None, WHOLE))
     assert found.shape == (24, 4, 4)
     np.testing.assert_allclose(np.linalg.det(found[:, :3, :3]), 1)
     assert np.abs(found - T_cam_model).max(axis=(1, 2)).min() < 1e-6
@@ -40,8 +43,9 @@ def test_principal_axes_give_the_pose_of_a_whole_surface(models):
 def test_raised_poses_reach_the_top_of_what_is_seen(models):
     where = T_CAM_WORLD @ similarity(translation=np.array([0.05, -0.04, 0.09]))
     verifier = verifier_of(box(), where)
-    resting = resting_initial_poses(models[0], verifier.points, TABLE, CONFIG)
-    raised = raised_poses(resting, models[0], verifier.points, TABLE, CONFIG)
+    footprint = verifier.outline(CONFIG).footprint
+    resting = resting_initial_poses(models[0], footprint, CONFIG)
+    raised = raised_poses(resting, models[0], footprint, CONFIG)
     assert len(raised)
     top = np.quantile(TABLE.signed_distance(verifier.points), 1 - CONFIG.stray)
     for T in raised:
@@ -64,7 +68,7 @@ def test_a_turned_model_lies_over_what_is_seen(models):
     """The side that faces the camera, and no other, has the box of the seen points."""
     where = T_CAM_WORLD @ similarity(translation=np.array([0.05, -0.04, 0.2]))
     verifier = verifier_of(box(), where)
-    poses = turned_poses(spread_rotations(CONFIG.rotations), models[0], verifier.points, CONFIG)
+    poses = turned_poses(spread_rotations(CONFIG.rotations), models[0], verifier.outline(CONFIG), CONFIG)
     assert len(poses) == CONFIG.rotations
     turn = np.einsum("bij,ij->b", poses[:, :3, :3], where[:3, :3])
     nearest = poses[int(turn.argmax())]

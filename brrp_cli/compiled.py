@@ -1,0 +1,25 @@
+"""Inner loops as machine code.
+
+NumPy goes over an array once for every operation; a placement of twenty points is so small that
+most of the time goes into the calls. Numba makes one loop of them, which leaves the interpreter to
+other threads. It compiles a function when it is first called, and keeps the result beside the
+source, or in the user's cache folder.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TypeVar, cast
+
+from numba import njit
+
+F = TypeVar("F", bound=Callable[..., object])
+
+
+def compiled(function: F) -> F:
+    """`function` of numbers and arrays, compiled. What it calls is in its own file: a change
+    elsewhere would not be seen, and the kept code used on."""
+    try:
+        return cast(F, njit(cache=True, nogil=True)(function))
+    except RuntimeError:  # there is no folder to keep it in
+        return cast(F, njit(nogil=True)(function))
