@@ -15,10 +15,11 @@ from brrp_cli.methods.brrp_default import reconstruct_by_hypotheses
 from brrp_cli.methods.each_object import checked, guarded
 from brrp_cli.methods.earlier_views import EarlierViews
 from brrp_cli.methods.scene import Scene
-from brrp_cli.methods.shared_work import shared_work
+from brrp_cli.methods.shared_work import each_shared, shared_work
 from brrp_cli.observation.ray_samples import SampledScene
 from brrp_cli.reconstruction import ObjectReconstruction
-from brrp_cli.retrieval.base import Retriever
+from brrp_cli.retrieval.base import Retriever, helped
+from brrp_cli.threads import cores
 
 
 @dataclass(frozen=True)
@@ -39,7 +40,12 @@ def by_hypotheses(
     stream = setup.stream
     # Earlier frames are more to send than a helper would save.
     helpers = None if stream is not None and any(stream.earlier.values()) else setup.helpers
-    with shared_work(_reconstructed, _Objects(scene, sampled, stream), helpers) as work:
+    assert setup.retriever is not None
+    each = each_shared(scene, setup.helpers, setup.workers or cores())
+    with (
+        helped(setup.retriever, each),
+        shared_work(_reconstructed, _Objects(scene, sampled, stream), scene, helpers) as work,
+    ):
 
         def retrieved(object_id: int) -> ObjectReconstruction:
             start = time.perf_counter()

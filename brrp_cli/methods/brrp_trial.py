@@ -19,18 +19,20 @@ from brrp_cli.methods.shared_work import shared_work
 from brrp_cli.observation.ray_samples import without_samples
 from brrp_cli.observation.strays import without_strays
 from brrp_cli.reconstruction import OK, ObjectReconstruction
-from brrp_cli.retrieval.base import hasty, unknown
+from brrp_cli.retrieval.base import Retriever, hasty, sendable, unknown
 from brrp_cli.retrieval.checked import CheckedRetriever
 from brrp_cli.threads import cores, in_threads
 
 
 @dataclass(frozen=True)
 class _Tries:
-    """scene : of the frame as it is; tried_id : of what is tried, which no object has"""
+    """scene : of the frame as it is; tried_id : of what is tried, which no object has; retriever :
+    for whoever tries a mask, None where it cannot be sent"""
 
     scene: Scene
     trial: Trial
     tried_id: int
+    retriever: Retriever | None
 
 
 def try_masks(frame: Frame, setup: Setup, trial: Trial) -> list[ObjectReconstruction]:
@@ -44,26 +46,18 @@ def try_masks(frame: Frame, setup: Setup, trial: Trial) -> list[ObjectReconstruc
     frame = without_strays(frame, config.strays, ())
     # A mask that is tried takes little from the background, if anything.
     scene = look_at(frame, setup, retriever)
-    tries = _Tries(scene, trial, int(frame.segmap.max()) + 1)
-    least = config.observation.min_points
+    sent = retriever if sendable(setup.retriever) else None
+    tries = _Tries(scene, trial, int(frame.segmap.max()) + 1, sent)
 
-    with (
-        hasty(setup.retriever),
-        shared_work(_placed, tries, setup.helpers) as work,
-    ):
+    with hasty(setup.retriever), shared_work(_tried, tries, scene, setup.helpers) as work:
 
         def one(number: int) -> ObjectReconstruction:
-            tried = _tried_frame(tries, number)
-            count = len(tried.object_points(tries.tried_id))
-            if count < least:
-                return too_few(number, count, least)
-            probabilities = retriever.probabilities(tried, tries.tried_id)
-            missing = unknown(probabilities)
-            if missing > trial.config.most_missing:
-                return ObjectReconstruction(
-                    number, OK, unknown_probability=missing, unknown_weight=1.0
-                )
-            return replace(work(number, probabilities), object_id=number)
+            if sent is not None:
+                return work(number)
+            frame = _tried_frame(tries, number)
+            if len(frame.object_points(tries.tried_id)) < config.observation.min_points:
+                return work(number)
+            return work(number, retriever.probabilities(frame, tries.tried_id))
 
         def whole(number: int) -> ObjectReconstruction:
             return guarded(number, partial(one, number), logging.DEBUG)
@@ -78,9 +72,22 @@ def _tried_frame(tries: _Tries, number: int) -> Frame:
     return without_strays(frame.with_masks(segmap), tries.scene.config.strays, (), [tried_id])
 
 
-def _placed(tries: _Tries, number: int, probabilities: NDArray[np.float64]) -> ObjectReconstruction:
-    tried = _tried_frame(tries, number)
-    observation = without_samples(tried, tries.tried_id)
-    return reconstruct_by_hypotheses(
-        replace(tries.scene, frame=tried), observation, probabilities, trial=tries.trial.config
-    )
+def _tried(
+    tries: _Tries, number: int, probabilities: NDArray[np.float64] | None = None
+) -> ObjectReconstruction:
+    """What one mask is taken for; `probabilities` (n,) where they are known."""
+    scene, config = tries.scene, tries.trial.config
+    frame = _tried_frame(tries, number)
+    count, least = len(frame.object_points(tries.tried_id)), scene.config.observation.min_points
+    if count < least:
+        return too_few(number, count, least)
+    if probabilities is None:
+        assert tries.retriever is not None
+        probabilities = tries.retriever.probabilities(frame, tries.tried_id)
+    missing = unknown(probabilities)
+    if missing > config.most_missing:
+        return ObjectReconstruction(number, OK, unknown_probability=missing, unknown_weight=1.0)
+    observation = without_samples(frame, tries.tried_id)
+    scene = replace(scene, frame=frame)
+    item = reconstruct_by_hypotheses(scene, observation, probabilities, trial=config)
+    return replace(item, object_id=number)

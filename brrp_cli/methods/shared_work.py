@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
-from typing import Any, Protocol, TypeVar
+from typing import Any, TypeVar
 
 from brrp_cli.errors import PriorError
 from brrp_cli.executors.helpers import Helpers, LostError, shared
 from brrp_cli.methods.base import Method
 from brrp_cli.methods.scene import Scene
 from brrp_cli.prior.by_name import from_bytes, to_bytes
-from brrp_cli.threads import cores
+from brrp_cli.retrieval.base import Each
+from brrp_cli.threads import cores, in_threads
 
 log = logging.getLogger(__name__)
 
@@ -21,15 +22,6 @@ log = logging.getLogger(__name__)
 MOST = 3
 
 
-class OfScene(Protocol):
-    """What is done to each object hangs on this, and so on one scene."""
-
-    @property
-    def scene(self) -> Scene:
-        """See above."""
-
-
-C = TypeVar("C", bound=OfScene)
 R = TypeVar("R")
 
 
@@ -40,26 +32,26 @@ def started_later(method: Method, workers: int | None, count: int | None) -> Hel
         return Helpers(0)
     if count is None:
         count = min((workers or cores()) - 1, MOST)
-    return Helpers(count, [__name__, "brrp_cli.methods.brrp_objects"])
+    return Helpers(count, [__name__, "brrp_cli.methods.brrp_objects", "brrp_cli.retrieval.steps"])
 
 
 @contextmanager
 def shared_work(
-    do: Callable[..., R], common: C, helpers: Helpers | None
+    do: Callable[..., R], common: Any, scene: Scene, helpers: Helpers | None
 ) -> Iterator[Callable[..., R]]:
     """`do(common, *args)` as a function of args, which threads may call at the same time. Helpers
     import `do` by its name.
 
-    A helper that is lost costs time: its work is done here.
+    scene : to which `common` belongs. A helper that is lost costs time: its work is done here.
     """
     # One device is for one process.
-    if helpers is None or not helpers.any_ready or common.scene.device != "cpu":
+    if helpers is None or not helpers.any_ready or scene.device != "cpu":
         yield lambda *args: do(common, *args)
         return
-    prior, known = common.scene.prior, _known(common)
+    prior, known = scene.prior, _known(scene)
     with ExitStack() as stack:
         try:
-            path = str(stack.enter_context(shared(to_bytes(common, prior))))
+            path = str(stack.enter_context(shared(to_bytes((common, scene), prior))))
         except OSError as error:  # no room for it
             log.info("Helpers are left out: %r", error)
             yield lambda *args: do(common, *args)
@@ -78,13 +70,22 @@ def shared_work(
         yield call
 
 
-def _known(common: OfScene) -> tuple[object, ...]:
+def each_shared(scene: Scene, helpers: Helpers | None, workers: int) -> Each:
+    """`Each` of retrievers, over `workers` threads and the helpers."""
+
+    def each(do: Callable[..., R], common: Any, args: Sequence[tuple[Any, ...]], /) -> list[R]:
+        with shared_work(do, common, scene, helpers) as work:
+            return list(in_threads(lambda one: work(*one), args, workers))
+
+    return each
+
+
+def _known(scene: Scene) -> tuple[object, ...]:
     """What results may hold of a scene, and are not to bring back."""
-    scene = common.scene
     return scene.frame, scene.image.plane, scene.image.noise
 
 
-_last: tuple[str, Any] | None = None
+_last: tuple[str, Any, Scene] | None = None
 
 
 def _there(do: Callable[..., Any], path: str, args: tuple[Any, ...]) -> bytes:
@@ -92,9 +93,9 @@ def _there(do: Callable[..., Any], path: str, args: tuple[Any, ...]) -> bytes:
     global _last
     if _last is None or _last[0] != path:
         try:
-            _last = path, from_bytes(Path(path).read_bytes())
+            _last = path, *from_bytes(Path(path).read_bytes())
         except (OSError, PriorError) as error:
             # Who opened the prior before it was changed can still use it.
             raise LostError(repr(error)) from error
-    common = _last[1]
-    return to_bytes(do(common, *args), common.scene.prior, _known(common))
+    _, common, scene = _last
+    return to_bytes(do(common, *args), scene.prior, _known(scene))

@@ -9,9 +9,9 @@ brrp_cli/config/retrieval.py.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,12 +25,10 @@ from brrp_cli.observation.sensor_noise import wave_deviation
 from brrp_cli.observation.strays import without_strays
 from brrp_cli.observation.support_plane import Plane
 from brrp_cli.prior.store import Prior
-from brrp_cli.retrieval.aligned import Aligner
-from brrp_cli.retrieval.illuminants import lights, local_lights, log_prior
-from brrp_cli.retrieval.observed_appearance import see_object
+from brrp_cli.retrieval.base import Each, here
+from brrp_cli.retrieval.illuminants import local_lights, log_prior
 from brrp_cli.retrieval.score_fusion import Similarity, believe
-from brrp_cli.retrieval.shortlist import Shortlist, kinds
-from brrp_cli.retrieval.similarity import lit_histograms, similarity
+from brrp_cli.retrieval.steps import SeenImage, Steps, aligned, looked
 
 
 class AppearanceRetriever:
@@ -42,31 +40,31 @@ class AppearanceRetriever:
     """
 
     name = "appearance"
+    sendable = True
 
-    def __init__(self, prior: Prior, config: Config, seed: int) -> None:
-        self._looks = prior.appearance
-        self._config = config
-        own = config.retrieval
-        self._shortlist = Shortlist(self._looks.first, own)
-        self._seed = seed
-        self._gains = lights(own.illuminants)
-        self._light = log_prior(self._gains, own.illuminants)
-        self._local = local_lights(self._gains, own.illuminants)
-        self._names = prior.names
-        self._aligner = Aligner(prior, own.alignment)
-        self.aligns = len(prior.names) >= own.alignment.from_objects
-        self._similarity = own.similarity
-        if not self.aligns:
-            self._similarity = replace(own.similarity, blur=0.0, size_most=np.inf)
-        # The paper's preset has no numbers of its own for the sensor.
-        hypotheses = config.hypotheses or HypothesesConfig()
-        self._sensor = hypotheses.sensor
+    def __init__(self, prior: Prior, config: Config, seed: int, steps: Steps | None = None) -> None:
+        self._steps = steps or Steps(prior, config, seed)
+        self._made_of = prior, config, seed
+        self._light = log_prior(self._steps.gains, config.retrieval.illuminants)
+        self._local = local_lights(self._steps.gains, config.retrieval.illuminants)
         self._frame: Frame | None = None
         self._answers: dict[int, NDArray[np.float64]] = {}
         self._hasty = False
+        self._each: Each = here
         # What was seen of a mask of the present image, by its bytes and whether that was in haste.
         self._seen: dict[tuple[bytes, bool], Similarity] | None = None
-        self._plane: Plane | None = None
+        self._table: tuple[Plane | None, float] | None = None
+
+    def __reduce__(self) -> tuple[Callable[..., AppearanceRetriever], tuple[Any, ...]]:
+        seen = None
+        if self._seen is not None:
+            seen = {key: found for key, found in self._seen.items() if not key[1]}
+        return _received, (*self._made_of, self._steps, seen, self._table, self._hasty)
+
+    @property
+    def aligns(self) -> bool:
+        """See above."""
+        return self._steps.aligns
 
     @contextmanager
     def one_image(self) -> Iterator[None]:
@@ -75,7 +73,7 @@ class AppearanceRetriever:
         try:
             yield
         finally:
-            self._seen = self._frame = self._plane = None
+            self._seen = self._frame = self._table = None
 
     @contextmanager
     def hasty(self) -> Iterator[None]:
@@ -86,12 +84,21 @@ class AppearanceRetriever:
         finally:
             self._hasty, self._frame = False, None
 
+    @contextmanager
+    def helped(self, each: Each) -> Iterator[None]:
+        """See retrieval/base.py."""
+        self._each = each
+        try:
+            yield
+        finally:
+            self._each = here
+
     def probabilities(self, frame: Frame, object_id: int) -> NDArray[np.float64]:
         """P(c|R) (n,) for one object of the frame, in the order of the prior's names; sum <= 1."""
         if frame is not self._frame:
             # Of masks that are tried, only the one that is asked about is looked at.
             found = self.evidence(frame, [object_id] if self._hasty else None)
-            own = self._config.retrieval
+            own = self._made_of[1].retrieval
             weights = own.fusion if self.aligns else own.likeness
             answers = self._believe(list(found.values()), weights)
             self._answers = dict(zip(found, answers, strict=True))
@@ -116,95 +123,59 @@ class AppearanceRetriever:
             tried = {i: (masks[i], True) for i in asked or masks if i not in found}
             found |= {i: known[key] for i, key in tried.items() if key in known}
         new = [i for i in masks if i not in found and (asked is None or i in asked)]
-        looked = self._compared(frame, new)
-        known.update({(masks[i], self._hasty): seen for i, seen in looked.items()})
-        found |= looked
+        compared = self._compared(frame, new) if new else {}
+        known.update({(masks[i], self._hasty): seen for i, seen in compared.items()})
+        found |= compared
         return {i: found[i] for i in masks if i in found}
 
     def _compared(self, frame: Frame, ids: Sequence[int]) -> dict[int, Similarity]:
         # Methods that leave strays out, and those that do not, get the same answer.
-        frame = without_strays(frame, self._config.strays)
-        plane, own = self.plane(frame), self._config.retrieval
-        looks, points = {}, {}
-        for object_id in ids:
-            seen = see_object(frame, object_id, plane, own.observed)
-            histograms = lit_histograms(seen, self._gains)
-            rows = self._shortlist.rows(seen, histograms)
-            stored = self._looks.rows(rows)
-            looks[object_id] = similarity(
-                seen, histograms, stored, rows, len(self._gains), self._similarity
-            )
-            points[object_id] = seen.points
-        if not self.aligns:
-            return looks
-        if plane is None:
-            return {i: replace(look, alignment=own.alignment.neutral) for i, look in looks.items()}
-        likely = self._believe(list(looks.values()), own.likeness)
-        wave = wave_deviation(frame, plane, self._sensor)
-        return {
-            i: self._aligned(look, probabilities[look.rows], points[i], frame, plane, wave)
-            for (i, look), probabilities in zip(looks.items(), likely, strict=True)
-        }
-
-    def _aligned(
-        self,
-        look: Similarity,
-        likely: NDArray[np.float64],
-        points: NDArray[np.float64],
-        frame: Frame,
-        plane: Plane,
-        wave: float,
-    ) -> Similarity:
-        """With the alignment scores of the objects that are `likely` (m,) by their looks."""
-        own = self._config.retrieval.alignment
-        if len(points) < own.least_points:
-            return replace(look, alignment=own.neutral)
-        alike = np.argsort(-likely, kind="stable")
-        alike = alike[likely[alike] > likely.max() * np.exp(-own.margin)]
-        ranked = [alike[kind] for kind in kinds(self._shortlist.plain[look.rows[alike]])]
-        shuffled = points[np.random.default_rng(self._seed).permutation(len(points))]
-        seen = self._aligner.on(shuffled, frame, plane, wave)
-        alignment = np.full(len(look.rows), own.unaligned, np.float32)
-        rounds = min(own.hasty_rounds, own.rounds) if self._hasty else own.rounds
-        for begin in range(0, rounds * own.tried, own.tried):
-            # In the prior's order, in which shards hold them.
-            tried = np.sort(np.concatenate([kind[begin : begin + own.tried] for kind in ranked]))
-            first = seen.first_scores(self._named(look.rows[tried]))
-            promise = np.log(likely[tried]) + own.first * first
-            order = tried[np.argsort(-promise, kind="stable")]
-            for chosen in (order[: own.most], order[own.most : own.most + own.more]):
-                found = seen.scores(self._named(look.rows[chosen]))
-                alignment[chosen] = np.maximum(found, own.lowest)
-                if found.max(initial=0.0) >= own.enough:
-                    break
-            if alignment.max(initial=0.0) >= own.certain:
-                break
-        promise = np.log(np.maximum(likely, np.finfo(float).tiny)) + own.first * alignment
-        promise[alignment <= own.lowest] = -np.inf
-        last = np.argsort(-promise, kind="stable")[: own.last]
-        last = np.sort(last[np.isfinite(promise[last])])
-        found = seen.last_scores(self._named(look.rows[last]), own.finest)
-        alignment[last] = np.maximum(found, own.lowest)
-        return replace(look, alignment=alignment, wave=wave)
-
-    def _named(self, rows: NDArray[np.int64]) -> list[str]:
-        return [self._names[row] for row in rows]
+        frame = without_strays(frame, self._made_of[1].strays)
+        plane, wave = self._seen_table(frame)
+        image = SeenImage(self._steps, frame, plane, wave)
+        found = self._each(looked, image, [(object_id,) for object_id in ids])
+        looks = [look for look, _ in found]
+        if self.aligns:
+            likely = self._believe(looks, self._made_of[1].retrieval.likeness)
+            asked = [
+                (look, probabilities[look.rows], points, self._hasty)
+                for (look, points), probabilities in zip(found, likely, strict=True)
+            ]
+            looks = self._each(aligned, image, asked)
+        return dict(zip(ids, looks, strict=True))
 
     def _believe(
         self, evidence: Sequence[Similarity], weights: FusionConfig
     ) -> list[NDArray[np.float64]]:
-        return believe(
-            evidence,
-            self._light,
-            self._local,
-            len(self._looks),
-            weights,
-        )
+        count = len(self._made_of[0].names)
+        return believe(evidence, self._light, self._local, count, weights)
 
-    def plane(self, frame: Frame) -> Plane | None:
-        """The support plane of the frame; None where none is found."""
-        if self._seen is None:
-            return scene_plane(frame, self._config.observation, self._seed)
-        if self._plane is None:
-            self._plane = scene_plane(frame, self._config.observation, self._seed)
-        return self._plane
+    def _seen_table(self, frame: Frame) -> tuple[Plane | None, float]:
+        """The support plane of the frame, None where none is found, and how its depth errs over
+        patches; of one image, what its first frame shows."""
+        if self._table is not None:
+            return self._table
+        _, config, seed = self._made_of
+        plane, wave = scene_plane(frame, config.observation, seed), 0.0
+        if plane is not None and self.aligns:
+            # The paper's preset has no numbers of its own for the sensor.
+            hypotheses = config.hypotheses or HypothesesConfig()
+            wave = wave_deviation(frame, plane, hypotheses.sensor)
+        if self._seen is not None:
+            self._table = plane, wave
+        return plane, wave
+
+
+def _received(
+    prior: Prior,
+    config: Config,
+    seed: int,
+    steps: Steps,
+    seen: dict[tuple[bytes, bool], Similarity] | None,
+    table: tuple[Plane | None, float] | None,
+    hasty: bool,
+) -> AppearanceRetriever:
+    """In another process, with what was seen of the present image."""
+    retriever = AppearanceRetriever(prior, config, seed, steps)
+    retriever._seen, retriever._table, retriever._hasty = seen, table, hasty
+    return retriever

@@ -6,15 +6,31 @@ is seen of one object can stand in.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, nullcontext
 from heapq import nsmallest
-from typing import Protocol
+from typing import Any, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from brrp_cli.frames.frame import Frame
+
+R = TypeVar("R")
+
+
+class Each(Protocol):
+    """do(common, *one) of each of `args`, in their order, wherever; `do` goes by its name."""
+
+    def __call__(
+        self, do: Callable[..., R], common: Any, args: Sequence[tuple[Any, ...]], /
+    ) -> list[R]:
+        """See above."""
+
+
+def here(do: Callable[..., R], common: Any, args: Sequence[tuple[Any, ...]], /) -> list[R]:
+    """`Each`, one after the other."""
+    return [do(common, *one) for one in args]
 
 
 class Retriever(Protocol):
@@ -57,6 +73,18 @@ def hasty(retriever: Retriever) -> Iterator[None]:
     object. It has a method `hasty` then."""
     with getattr(retriever, "hasty", nullcontext)():
         yield
+
+
+@contextmanager
+def helped(retriever: Retriever, each: Each) -> Iterator[None]:
+    """While this lasts, a retriever may let others do its steps. It has a method `helped` then."""
+    with getattr(retriever, "helped", lambda _: nullcontext())(each):
+        yield
+
+
+def sendable(retriever: Retriever) -> bool:
+    """Whether another process can ask a copy of it. It has `sendable` = True then."""
+    return bool(getattr(retriever, "sendable", False))
 
 
 def unknown(probabilities: NDArray[np.floating]) -> float:

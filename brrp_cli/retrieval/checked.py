@@ -25,6 +25,9 @@ class CheckedRetriever:
         # Retrievers answer for all objects of a frame at the first question about one.
         self._asked = Lock()
 
+    def __reduce__(self) -> tuple[type[CheckedRetriever], tuple[Retriever, int]]:
+        return CheckedRetriever, (self._retriever, self._count)
+
     @property
     def name(self) -> str:
         """The asked retriever's name."""

@@ -9,7 +9,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brrp_cli.frames.frame import Frame
-from brrp_cli.retrieval.base import Retriever, hasty, knows_depth, one_image, unknown
+from brrp_cli.retrieval.base import (
+    Each,
+    Retriever,
+    hasty,
+    helped,
+    knows_depth,
+    one_image,
+    unknown,
+)
 
 
 class BothRetriever:
@@ -41,6 +49,12 @@ class BothRetriever:
     def hasty(self) -> Iterator[None]:
         """See retrieval/base.py."""
         with hasty(self._first), hasty(self._second):
+            yield
+
+    @contextmanager
+    def helped(self, each: Each) -> Iterator[None]:
+        """See retrieval/base.py."""
+        with helped(self._first, each), helped(self._second, each):
             yield
 
     def probabilities(self, frame: Frame, object_id: int) -> NDArray[np.float64]:

@@ -74,7 +74,7 @@ def test_who_is_free_does_it(common, helpers, frame):
         both.wait()
         return do("work", number)
 
-    with shared_work(for_helpers.here_or_there, common, helpers) as do:
+    with shared_work(for_helpers.here_or_there, common, common.scene, helpers) as do:
         for turn in range(3):
             found = list(in_threads(work_of, [2 * turn, 2 * turn + 1], 2))
             assert [number for _, number, _ in found] == [2 * turn, 2 * turn + 1]
@@ -85,7 +85,7 @@ def test_who_is_free_does_it(common, helpers, frame):
 
 
 def test_what_a_helper_dies_of_is_done_here(common, helpers):
-    with shared_work(for_helpers.here_or_there, common, helpers) as do:
+    with shared_work(for_helpers.here_or_there, common, common.scene, helpers) as do:
         assert do("die", 3)[:2] == (False, 3)
         assert do("work", 4)[:2] == (False, 4), "it is gone"
 
@@ -94,9 +94,10 @@ def test_a_helper_that_cannot_open_the_prior_leaves_the_work_here(common, helper
     """It was built again meanwhile; who has opened it before goes on."""
     changed = replace(prior, index=replace(prior.index, digest="0" * 64))
     scene = SimpleNamespace(**{**vars(common.scene), "prior": changed})
-    with shared_work(for_helpers.here_or_there, replace(common, scene=scene), helpers) as do:
+    there = replace(common, scene=scene)
+    with shared_work(for_helpers.here_or_there, there, scene, helpers) as do:
         assert do("work", 5)[:2] == (False, 5)
-    with shared_work(for_helpers.here_or_there, common, helpers) as do:
+    with shared_work(for_helpers.here_or_there, common, common.scene, helpers) as do:
         assert do("work", 6)[:2] == (True, 6)
 
 
@@ -105,12 +106,12 @@ def test_without_room_for_what_is_shared_the_work_is_done_here(common, helpers, 
         raise OSError(errno.ENOSPC, "No space left on device")
 
     monkeypatch.setattr(tempfile, "NamedTemporaryFile", full)
-    with shared_work(for_helpers.here_or_there, common, helpers) as do:
+    with shared_work(for_helpers.here_or_there, common, common.scene, helpers) as do:
         assert do("work", 5)[:2] == (False, 5)
 
 
 def test_errors_are_those_of_the_work(common, helpers):
-    with shared_work(for_helpers.here_or_there, common, helpers) as do:
+    with shared_work(for_helpers.here_or_there, common, common.scene, helpers) as do:
         with pytest.raises(PriorError, match="damaged"):
             do("fail", 0)
         assert do("work", 1)[0] is True

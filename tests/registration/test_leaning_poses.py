@@ -68,7 +68,9 @@ def test_a_turned_model_lies_over_what_is_seen(models):
     """The side that faces the camera, and no other, has the box of the seen points."""
     where = T_CAM_WORLD @ similarity(translation=np.array([0.05, -0.04, 0.2]))
     verifier = verifier_of(box(), where)
-    poses = turned_poses(spread_rotations(CONFIG.rotations), models[0], verifier.outline(CONFIG), CONFIG)
+    poses = turned_poses(
+        spread_rotations(CONFIG.rotations), models[0], verifier.outline(CONFIG), CONFIG
+    )
     assert len(poses) == CONFIG.rotations
     turn = np.einsum("bij,ij->b", poses[:, :3, :3], where[:3, :3])
     nearest = poses[int(turn.argmax())]

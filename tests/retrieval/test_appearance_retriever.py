@@ -6,12 +6,13 @@ from painted_scene import STRANGE, THINGS, photograph, write_things
 
 from brrp_cli.config import FeatureConfig, preset
 from brrp_cli.errors import RetrievalError
+from brrp_cli.observation.ray_samples import scene_plane
 from brrp_cli.observation.strays import without_strays
 from brrp_cli.prior.build.build import build_prior
 from brrp_cli.prior.parameters import BuildParameters
 from brrp_cli.prior.store import open_prior
 from brrp_cli.registration.model import search_model
-from brrp_cli.retrieval import appearance
+from brrp_cli.retrieval import steps
 from brrp_cli.retrieval.aligned import PARTS, bare_model
 from brrp_cli.retrieval.appearance import AppearanceRetriever
 from brrp_cli.retrieval.base import hasty, one_image, unknown
@@ -88,8 +89,8 @@ def test_of_one_image_what_was_seen_of_a_mask_counts_again(retriever, monkeypatc
     joined = dataclasses.replace(frame, segmap=np.where(frame.segmap == 4, 3, frame.segmap))
     fresh = retriever.evidence(frame)
     seen = []
-    look = appearance.see_object
-    monkeypatch.setattr(appearance, "see_object", lambda *args: seen.append(args[1]) or look(*args))
+    look = steps.see_object
+    monkeypatch.setattr(steps, "see_object", lambda *args: seen.append(args[1]) or look(*args))
     with one_image(retriever):
         assert retriever.evidence(frame).keys() == fresh.keys()
         again = retriever.evidence(joined)
@@ -180,8 +181,9 @@ def test_without_a_plane_nothing_is_aligned(aligner):
     frame, _ = scene()
     floating = np.where((frame.segmap == 0)[..., None], np.nan, frame.points)
     bare = dataclasses.replace(frame, points=floating.astype(np.float32))
-    neutral = preset("default").retrieval.alignment.neutral
-    assert aligner.plane(bare) is None
+    config = preset("default")
+    neutral = config.retrieval.alignment.neutral
+    assert scene_plane(bare, config.observation, 0) is None
     assert all(np.all(look.alignment == neutral) for look in aligner.evidence(bare).values())
 
 
