@@ -30,9 +30,9 @@ def hull_facets(points: Array, thickness: float) -> Array:
 def outside_hull(points: Array, facets: Array) -> Array:
     """How far (n,) points (n, 3) lie outside of a hull's facets (f, 4), less than 0 inside: a lower
     bound of the distance to the hull."""
-    # In float32 about the middle, and so many points at once that their products, one for each
-    # facet, stay in the cache.
-    middle = points.mean(axis=0)
+    # In float32 about the middle of the hull, and so many points at once that their products, one
+    # for each facet, stay in the cache.
+    middle = -np.linalg.pinv(facets[:, :3]) @ facets[:, 3]
     near = np.ascontiguousarray((points - middle).T, dtype=np.float32)
     offsets = (facets[:, 3] + facets[:, :3] @ middle).astype(np.float32)[:, None]
     normals = facets[:, :3].astype(np.float32)

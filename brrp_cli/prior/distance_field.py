@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brrp_cli.dependencies import import_open3d
-from brrp_cli.distance_loops import distances, distances_and_gradients
 from brrp_cli.prior.parameters import FieldConfig
 
 if TYPE_CHECKING:
@@ -54,12 +53,17 @@ class DistanceField:
 
     def distance(self, points: NDArray[np.float32]) -> NDArray[np.float32]:
         """`signed_distance` (n,) at points (3, n), in single precision."""
+        # Late, as Open3D is: what only lists a prior does not wait for a compiler.
+        from brrp_cli.distance_loops import distances
+
         return distances(self.values, self.lower, self.spacing, points)
 
     def distance_and_gradient(
         self, points: NDArray[np.float32]
     ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
         """Distance (n,) at points (3, n), as `signed_distance` has it, and its gradient (3, n)."""
+        from brrp_cli.distance_loops import distances_and_gradients
+
         return distances_and_gradients(self.values, self.lower, self.spacing, points)
 
 

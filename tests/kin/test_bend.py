@@ -11,8 +11,9 @@ from table_scene import TABLE, in_camera, photograph, placed
 from brrp_cli.config import preset
 from brrp_cli.geometry import transform_points
 from brrp_cli.kin import bend
-from brrp_cli.kin.bending import UNKNOWNS, BentFit, BoxPoints, bent
+from brrp_cli.kin.bending import UNKNOWNS, BentFit, BoxPoints
 from brrp_cli.kin.evidence import gather
+from brrp_cli.kin.stretched import BentShape, bent_shape
 from brrp_cli.kin.ways_out import ways_out
 from brrp_cli.shapes import solids
 
@@ -137,7 +138,9 @@ def test_a_cup_becomes_one_with_other_sides_on_the_far_side_too():
     turn = float(np.arctan2(T_plane_world[1, 0], T_plane_world[0, 0]))
     at = transform_points(T_plane_world, middle[None])[0]
     begun = BentFit(half, turn, at, half, 0.0, np.zeros((3, bend.TERMS)))
-    fit, _ = bent(begun, u, straight.vertex_normals * half, evidence, KIN)
+    grey = np.full(u.shape, 128, np.uint8)
+    shape = BentShape(begun, np.inf, u, np.asarray(straight.faces, np.int32), grey)
+    fit = bent_shape(shape, evidence, KIN, np.random.default_rng(0)).fit
     truth.apply_transform(T_plane_world)
     hidden = truth.vertex_normals @ (evidence.eye - at) < 0
     bulging = hidden & (np.abs(u[:, 2]) < 0.5)
