@@ -9,13 +9,14 @@ from brrp_cli.errors import RetrievalError
 from brrp_cli.observation.ray_samples import scene_plane
 from brrp_cli.observation.strays import without_strays
 from brrp_cli.prior.build.build import build_prior
+from brrp_cli.prior.by_name import from_bytes, to_bytes
 from brrp_cli.prior.parameters import BuildParameters
 from brrp_cli.prior.store import open_prior
 from brrp_cli.registration.model import search_model
 from brrp_cli.retrieval import steps
 from brrp_cli.retrieval.aligned import PARTS, bare_model
 from brrp_cli.retrieval.appearance import AppearanceRetriever
-from brrp_cli.retrieval.base import hasty, one_image, unknown
+from brrp_cli.retrieval.base import hasty, helped, one_image, sendable, unknown
 
 PLACES = {3: (-0.15, 0.1), 4: (0.12, 0.14), 8: (0.0, -0.02), 9: (0.2, -0.1), 11: (-0.2, -0.14)}
 STRANGER = 20
@@ -99,6 +100,61 @@ def test_of_one_image_what_was_seen_of_a_mask_counts_again(retriever, monkeypatc
             np.testing.assert_array_equal(again[object_id].pairs, fresh[object_id].pairs)
     retriever.evidence(joined)
     assert len(seen) == len(frame.object_ids) + 1 + len(joined.object_ids)
+
+
+def test_whoever_does_the_steps_the_answer_is_the_same(prior, retriever):
+    """Each step is sent by its name, as to another process."""
+    frame, _ = scene()
+    expected = retriever.evidence(frame)
+    asked = []
+
+    def elsewhere(do, common, args):
+        asked.append((do.__name__, len(args)))
+        image = from_bytes(to_bytes(common, prior), prior)
+        return [do(image, *from_bytes(to_bytes(one, prior), prior)) for one in args]
+
+    with helped(retriever, elsewhere):
+        found = retriever.evidence(dataclasses.replace(frame))
+    count = len(frame.object_ids)
+    assert asked == [("looked", count), ("aligned", count)][: 1 + retriever.aligns]
+    same(found, expected)
+    asked.clear()
+    retriever.evidence(frame)
+    assert not asked
+
+
+def test_a_copy_elsewhere_answers_alike_and_knows_what_was_seen(prior, retriever, monkeypatch):
+    frame, _ = scene()
+    assert sendable(retriever)
+    with one_image(retriever), hasty(retriever):
+        expected = retriever.probabilities(frame, 4)
+    with one_image(retriever):
+        retriever.evidence(frame)
+        with hasty(retriever):
+            known = retriever.probabilities(frame, 4)
+            sent = to_bytes(retriever, prior)
+    copy = from_bytes(sent, prior)
+    monkeypatch.setattr(steps, "see_object", None)
+    np.testing.assert_array_equal(copy.probabilities(frame, 4), known)
+    monkeypatch.undo()
+    fresh = from_bytes(to_bytes(retriever_like(prior, retriever), prior), prior)
+    with hasty(fresh):
+        np.testing.assert_array_equal(fresh.probabilities(frame, 4), expected)
+
+
+def same(found, expected):
+    """The same evidence, number by number."""
+    assert found.keys() == expected.keys()
+    for object_id, look in expected.items():
+        for field in dataclasses.fields(look):
+            np.testing.assert_array_equal(
+                getattr(found[object_id], field.name), getattr(look, field.name)
+            )
+
+
+def retriever_like(prior, retriever):
+    """Another, which has seen nothing."""
+    return retriever_of(prior, retriever.aligns)
 
 
 def test_a_stranger_is_told(retriever):
