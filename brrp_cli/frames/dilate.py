@@ -1,22 +1,44 @@
-"""Masks grown by a few pixels, at the cost of the mask and not of the image."""
+"""Masks grown or opened by a few pixels, at the cost of the mask and not of the image."""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
 
+Mask = NDArray[np.bool_]
 
-def dilated(mask: NDArray[np.bool_], pixels: int) -> NDArray[np.bool_]:
+
+def mask_box(mask: Mask, margin: int) -> tuple[slice, slice]:
+    """Rows and columns that hold a mask (H, W) and `margin` pixels around it, as far as the image
+    reaches; none of an empty one."""
+    rows, columns = (np.flatnonzero(mask.any(axis=axis)) for axis in (1, 0))
+    if not len(rows):
+        return slice(0), slice(0)
+    low, high = (int(rows[0]), int(columns[0])), (int(rows[-1]), int(columns[-1]))
+    by_row, by_column = (
+        slice(max(a - margin, 0), b + margin + 1) for a, b in zip(low, high, strict=True)
+    )
+    return by_row, by_column
+
+
+def dilated(mask: Mask, pixels: int) -> Mask:
     """A mask (H, W) and all that is within `pixels` steps along rows and columns of it."""
     from scipy.ndimage import binary_dilation
 
-    grown = np.zeros_like(mask)
-    rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
-    if len(rows) and pixels > 0:
-        box = tuple(
-            slice(max(int(each[0]) - pixels, 0), int(each[-1]) + pixels + 1)
-            for each in (rows, columns)
-        )
-        grown[box] = binary_dilation(mask[box], iterations=pixels)
-        return grown
-    return mask.copy()
+    if pixels == 0:
+        return mask.copy()
+    grown, box = np.zeros_like(mask), mask_box(mask, pixels)
+    grown[box] = binary_dilation(mask[box], iterations=pixels)
+    return grown
+
+
+def opened(mask: Mask, pixels: int) -> Mask:
+    """A mask (H, W) without what is narrower than `pixels` steps along rows and columns to each
+    side."""
+    from scipy.ndimage import binary_opening
+
+    if pixels == 0:
+        return mask.copy()
+    found, box = np.zeros_like(mask), mask_box(mask, 0)
+    found[box] = binary_opening(mask[box], iterations=pixels)
+    return found

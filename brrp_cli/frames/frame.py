@@ -80,6 +80,11 @@ class Frame:
         return np.isfinite(self.points).all(axis=-1) & (self.points[..., 2] > 0)
 
     @cached_property
+    def coloured(self) -> bool:
+        """Whether pixels differ in colour: a frame that was made without is of one grey."""
+        return bool(self.rgb.min() < self.rgb.max())
+
+    @cached_property
     def depth(self) -> NDArray[np.float32]:
         """(H, W) metres along z, NaN where there is no return: that of `points`, in one piece of
         memory, for those who look up pixels."""
@@ -90,7 +95,7 @@ class Frame:
     @cached_property
     def object_ids(self) -> list[int]:
         """Ids in the mask, ascending, without the background."""
-        return [int(i) for i in np.unique(self.segmap) if i != BACKGROUND]
+        return [int(i) for i in np.unique(self.segmap[self.segmap != BACKGROUND])]
 
     def with_masks(self, segmap: NDArray[np.integer]) -> Frame:
         """The same image with other masks (H, W). Unlike `dataclasses.replace` it copies nothing
@@ -111,4 +116,6 @@ class Frame:
 
     def object_points(self, object_id: int) -> NDArray[np.float32]:
         """(n, 3) valid points of one object, metres, camera frame."""
-        return self.points[self.valid & (self.segmap == object_id)]
+        # By number: a mask over three axes is looked up three times as slowly.
+        number = np.flatnonzero(self.valid & (self.segmap == object_id))
+        return self.points.reshape(-1, 3).take(number, axis=0)

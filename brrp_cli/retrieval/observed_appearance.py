@@ -12,6 +12,7 @@ from brrp_cli.dependencies import import_open3d
 from brrp_cli.descriptors.colour_histogram import palette
 from brrp_cli.descriptors.extents import footprint
 from brrp_cli.descriptors.point_pairs import CELL, MIN_POINTS, pair_histogram
+from brrp_cli.frames.dilate import mask_box
 from brrp_cli.frames.frame import Frame
 from brrp_cli.observation.support_plane import Plane
 
@@ -39,20 +40,23 @@ def see_object(
     frame: Frame, object_id: int, plane: Plane | None, config: ObservedAppearanceConfig
 ) -> SeenObject:
     """Describe what is seen of one object."""
-    mask = frame.segmap == object_id
-    solid = _without_plane(frame, mask & frame.valid, plane, config)
-    points = frame.points[solid].astype(np.float64)
+    whole = frame.segmap == object_id
+    # Only what is around the object matters.
+    box = mask_box(whole, config.reach)
+    mask, seen = whole[box], frame.points[box]
+    solid = _without_plane(seen, mask & frame.valid[box], plane, config)
+    points = seen[solid].astype(np.float64)
     colours = shares = None
-    # A frame that was made without colours is of one grey.
-    if frame.rgb.min() < frame.rgb.max():
-        colours, shares = palette(frame.rgb[_inner(solid if solid.any() else mask, config.inner)])
+    if frame.coloured:
+        inner = _inner(solid if solid.any() else mask, config.inner)
+        colours, shares = palette(frame.rgb[box][inner])
     pairs = _pairs(points, config)
     size = None if plane is None or pairs is None else _size(points, plane, config)
-    return SeenObject(colours, shares, pairs, size, points, _hidden(frame, mask, config))
+    return SeenObject(colours, shares, pairs, size, points, _hidden(frame, mask, box, config))
 
 
 def _without_plane(
-    frame: Frame,
+    seen: NDArray[np.floating],
     solid: NDArray[np.bool_],
     plane: Plane | None,
     config: ObservedAppearanceConfig,
@@ -60,7 +64,7 @@ def _without_plane(
     if plane is None:
         return solid
     above = solid.copy()
-    above[solid] = plane.signed_distance(frame.points[solid]) > config.above_plane
+    above[solid] = plane.signed_distance(seen[solid]) > config.above_plane
     return above if above.sum() >= config.left * solid.sum() else solid
 
 
@@ -94,21 +98,20 @@ def _size(
     return np.array([height, *footprint(points @ along.T, config.width_share)])
 
 
-def _hidden(frame: Frame, mask: NDArray[np.bool_], config: ObservedAppearanceConfig) -> float:
+def _hidden(
+    frame: Frame,
+    mask: NDArray[np.bool_],
+    box: tuple[slice, slice],
+    config: ObservedAppearanceConfig,
+) -> float:
     from scipy.ndimage import binary_erosion, minimum_filter
 
     reach = config.reach
-    # Only what is around the object matters.
-    rows, columns = np.nonzero(mask)
-    low = np.maximum([rows.min() - reach, columns.min() - reach], 0)
-    high = np.array([rows.max(), columns.max()]) + reach + 1
-    box = tuple(slice(a, b) for a, b in zip(low, high, strict=True))
-    here = mask[box]
-    silhouette = here & ~binary_erosion(here)
+    silhouette = mask & ~binary_erosion(mask)
     depth = np.where(frame.valid[box], frame.points[box][..., 2], np.inf)
-    others = np.where(here, np.inf, depth)
+    others = np.where(mask, np.inf, depth)
     nearest = minimum_filter(others, size=2 * reach + 1, mode="nearest")
     covered = (nearest < depth - config.in_front) & np.isfinite(depth)
-    border = np.ones(mask.shape, dtype=bool)
+    border = np.ones(frame.shape, dtype=bool)
     border[reach:-reach, reach:-reach] = False
     return float((silhouette & (covered | border[box])).sum() / max(silhouette.sum(), 1))

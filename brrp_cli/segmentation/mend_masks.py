@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from brrp_cli.config.mending import MendConfig
 from brrp_cli.dependencies import import_library
+from brrp_cli.frames.dilate import dilated, opened
 from brrp_cli.frames.frame import BACKGROUND
 
 Mask = NDArray[np.bool_]
@@ -137,19 +138,19 @@ def _give_back(
 ) -> None:
     """Compact groups of pixels that the object cannot have become objects of their own, or
     another's that explains them, or background where they lie on the table."""
-    ndimage = import_library("scipy.ndimage")
     mask = found == p.object_id
     # The silhouette of a placement that is right is a pixel or two beside the mask's.
-    near = ndimage.binary_dilation(p.depth > 0, iterations=config.silhouette)
+    near = dilated(p.depth > 0, config.silhouette)
     with np.errstate(invalid="ignore"):
         off = np.abs(p.depth - depth) > config.sure * tolerance
     strange = mask & seen & np.where(p.depth > 0, off, ~near)
-    core = ndimage.binary_opening(strange, iterations=config.opening)
+    core = opened(strange, config.opening)
     if not core.any():
         return
     # What is next to a group and not the object's either is the group's: also the silhouette's
     # neighbours, which would part a thing that stands on another in two.
-    around = ndimage.binary_dilation(core, iterations=config.opening + config.silhouette)
+    around = dilated(core, config.opening + config.silhouette)
+    ndimage = import_library("scipy.ndimage")
     groups, count = ndimage.label(around & mask & seen & ~explained[p.object_id])
     least = max(config.least_pixels, config.least_part * int((mask & seen).sum()))
     for group in range(1, count + 1):
