@@ -108,7 +108,7 @@ def _repaired(mesh: trimesh.Trimesh, cache: Path) -> trimesh.Trimesh:
 
     from brrp_cli.prior.build.repair import repair
 
-    kept = cache / f"{content_hash(mesh)}-exact.npz"
+    kept = cache / f"{content_hash(mesh)}-settled.npz"
     if kept.exists():
         with np.load(kept, allow_pickle=False) as arrays:
             return trimesh.Trimesh(arrays["vertices"], arrays["faces"], process=False)

@@ -61,12 +61,14 @@ class RepairConfig:
 
     small_hole : a hole whose rim is shorter across is a flaw, not a shape
     alpha : the wrap's probe enters every opening that is wider; offset : its surface lies so far
-    outside, so that a sheet of 25 cm becomes a wall of 2.5 mm
+    outside, before it is laid onto the mesh
+    wall : what is left around a sheet, so that one of 25 cm becomes a wall of 1.25 mm
     """
 
     small_hole: float = 0.1
     alpha: float = 0.02
     offset: float = 0.005
+    wall: float = 0.005
 
 
 @dataclass(frozen=True)

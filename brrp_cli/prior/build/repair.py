@@ -16,6 +16,7 @@ import numpy as np
 
 from brrp_cli.dependencies import import_library
 from brrp_cli.errors import MeshError
+from brrp_cli.prior.build.settle import settled
 from brrp_cli.prior.build.solids import is_flat, is_solid, unite_bodies
 from brrp_cli.prior.build.surface_distance import surface_distances
 from brrp_cli.prior.parameters import RepairConfig
@@ -160,10 +161,14 @@ def _wrap(mesh: trimesh.Trimesh, config: RepairConfig) -> tuple[trimesh.Trimesh,
             },
         ),
     )
-    step = f"wrapped the surface at {config.offset * diagonal * 1e3:.1f} mm"
+    wall = config.wall * diagonal
+    step = "wrapped the surface"
     if widest > config.small_hole * diagonal:
-        step += f"; openings up to {widest * 1e3:.0f} mm across stay open, as thin walls"
-    return wrapped, [step]
+        step += (
+            f"; openings up to {widest * 1e3:.0f} mm across stay open,"
+            f" sheets are walls of {wall * 1e3:.1f} mm"
+        )
+    return settled(wrapped, mesh, config.offset * diagonal, wall), [step]
 
 
 def boundary_rims(mesh: trimesh.Trimesh) -> list[np.ndarray]:

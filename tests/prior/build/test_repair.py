@@ -118,9 +118,9 @@ def test_the_opening_of_a_bowl_stays_open(sides: int) -> None:
         sheet = triangles(sheet.vertices, np.vstack([sheet.faces, sheet.faces[:, ::-1]]))
     repaired = repair(sheet)
     assert is_solid(repaired.mesh)
-    assert "thin walls" in repaired.record["steps"][-1]
-    # Half a ball would be 1072 cm3; the wall is 40,200 mm2 x 2.4 mm.
-    assert repaired.mesh.volume == pytest.approx(2 * np.pi * 0.08**2 * 0.0024, rel=0.1)
+    assert "sheets are walls of 1.2 mm" in repaired.record["steps"][-1]
+    # Half a ball would be 1072 cm3; the wall is 40,200 mm2 x 1.2 mm.
+    assert repaired.mesh.volume == pytest.approx(2 * np.pi * 0.08**2 * 0.0012, rel=0.1)
     hollow = np.array([[0, 0, -0.01], [0, 0, -0.04], [0.04, 0, -0.03]])
     assert np.abs(winding_number(repaired.mesh, hollow)).max() < 1e-6
     assert repaired.record["original_to_repaired"]["max"] < 0.002
