@@ -12,6 +12,7 @@ from scipy.ndimage import binary_dilation, maximum_filter, minimum_filter
 
 from brrp_cli.completion.network import fitted
 from brrp_cli.completion.point_features import point_features
+from brrp_cli.completion.seen_surface import Bounds, SeenSurface
 from brrp_cli.completion.usual_size import of_usual_size
 from brrp_cli.completion.visible_part import VisiblePart
 from brrp_cli.config import MeanConfig
@@ -25,13 +26,17 @@ Floats = NDArray[np.float32]
 
 
 def completed_grid(
-    nodes: Array, empty: NDArray[np.bool_], part: VisiblePart, config: MeanConfig
+    nodes: Array,
+    empty: NDArray[np.bool_],
+    part: VisiblePart,
+    surface: SeenSurface,
+    config: MeanConfig,
 ) -> NDArray[np.float16]:
     """Logits (nx, ny, nz) at nodes (nx, ny, nz, 3), metres, camera frame, of an object that is none
     of the stored ones; the least where it is empty."""
     guess = network_grid(nodes, empty, part, config)
-    crust = crust_of(nodes[~empty], part.frame, part.object_id, shell_of(nodes, config), config)
-    return with_crust(guess, empty, crust, config)
+    bounds = surface.bounds(nodes[~empty], shell_of(nodes, config), config)
+    return within(guess, empty, bounds, config)
 
 
 def network_grid(
@@ -65,15 +70,13 @@ def network_grid(
     return asked
 
 
-def with_crust(
-    guess: Floats, empty: NDArray[np.bool_], crust: NDArray[np.bool_], config: MeanConfig
+def within(
+    guess: Floats, empty: NDArray[np.bool_], bounds: Bounds, config: MeanConfig
 ) -> NDArray[np.float16]:
     """Logits (nx, ny, nz), limited: the network's `guess` (nx, ny, nz), the least where it is
-    empty. What was seen, `crust` (n,) of the nodes that are not empty, is occupied, however thin
-    the walls are that the network thinks of."""
+    empty. What was seen, the bounds (n,) of the nodes that are not empty, is where it was seen."""
     logits = np.full(empty.shape, -config.limit, np.float16)
-    limited = np.clip(guess[~empty], -config.limit, config.limit)
-    logits[~empty] = np.where(crust, np.maximum(limited, config.shell_logit), limited)
+    logits[~empty] = bounds.applied(np.clip(guess[~empty], -config.limit, config.limit))
     return logits
 
 
@@ -108,18 +111,6 @@ def _doubled(values: Floats, axis: int, count: int) -> Floats:
     found[::2] = first
     found[1::2] = (first[:-1] + first[1:]) / 2
     return np.moveaxis(found[:count], 0, axis)
-
-
-def crust_of(
-    points: Array, frame: Frame, object_id: int, shell: float, config: MeanConfig
-) -> NDArray[np.bool_]:
-    """Which of points (n, 3), metres, camera frame, lie in what was seen of an object, `shell`
-    metres thick."""
-    behind = -depth_behind(points, frame)
-    own = at_pixels(points, frame.segmap, frame) == object_id
-    return np.asarray(
-        own & (np.nan_to_num(behind, nan=np.inf) < shell) & (behind > -config.shell_before)
-    )
 
 
 def empty_space(

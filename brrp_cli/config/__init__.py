@@ -16,6 +16,8 @@ from brrp_cli.config.inference import (
     FittedMapConfig,
     InferenceConfig,
     MeanConfig,
+    RampConfig,
+    SmoothConfig,
     VolumeConfig,
 )
 from brrp_cli.config.kin import KinConfig
@@ -50,11 +52,13 @@ __all__ = [
     "MeanConfig",
     "ObservationConfig",
     "PointSDFConfig",
+    "RampConfig",
     "RayRefinementConfig",
     "RegistrationConfig",
     "RetrievalConfig",
     "SearchConfig",
     "SensorConfig",
+    "SmoothConfig",
     "StrayConfig",
     "SurfaceConfig",
     "TurnConfig",

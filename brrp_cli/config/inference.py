@@ -25,6 +25,40 @@ class InferenceConfig:
 
 
 @dataclass(frozen=True)
+class SmoothConfig:
+    """Depth of an object without the sensor's noise (brrp_cli/observation/smooth_depth.py).
+
+    reaches : metres, radii of the neighbourhoods to which planes are fitted; most_pixels : of them
+    gate : deviations from the plane before, beyond which a neighbour has no say
+    fit : a plane fits if the variance about it is at most so many times that of the noise
+    wave : share of the sensor's waves that counts as noise beside that of single pixels
+    """
+
+    reaches: tuple[float, float, float] = (0.003, 0.006, 0.012)
+    most_pixels: int = 12
+    gate: float = 3.0
+    fit: float = 1.2
+    wave: float = 0.5
+
+
+@dataclass(frozen=True)
+class RampConfig:
+    """The logit about what was seen (brrp_cli/completion/seen_surface.py).
+
+    width : metres, on either side of it
+    margin : radians from the mask's outline within which depth may be another thing's
+    rise : waves of the sensor above the plane, under which depth may be the plane's
+    nearer : waves by which the surface is nearer than measured where depth may be another thing's
+    """
+
+    width: float = 0.003
+    margin: float = 0.0042
+    rise: float = 4.0
+    nearer: float = between(1.0, 0.0, 10.0)
+    smooth: SmoothConfig = field(default_factory=SmoothConfig)
+
+
+@dataclass(frozen=True)
 class MeanConfig:
     """Prior mean functions of hypotheses, as logits.
 
@@ -32,9 +66,9 @@ class MeanConfig:
     within `exact` metres of its surface; an alignment score under `sure` widens it by `doubt`
     metres for each unit. An object that none explains is completed on a grid of about `nodes` nodes
     by a network, which is evaluated at every node where the coarse ones around are not all
-    `beyond_doubt`; its logit is `shell_logit` at least for `shell` metres behind what is seen of
-    it, or `shell_nodes` of the grid's spacings where these are longer, and `shell_before` metres in
-    front. Space is empty that lies more than `carve_depth` in front of the measured depth, or
+    `beyond_doubt`; about what is seen of it its logit is a `ramp` up to `shell_logit`, at least for
+    `shell` metres behind, or `shell_nodes` of the grid's spacings where these are longer. Space is
+    empty that lies more than `carve_depth` in front of the measured depth, or
     `carve_plane` below the plane, or less than `carve_behind` behind what is no object's and more
     than `carve_pixels` from the mask.
     """
@@ -49,7 +83,7 @@ class MeanConfig:
     shell: float = 0.004
     shell_nodes: float = 1.3
     shell_logit: float = 2.0
-    shell_before: float = 0.001
+    ramp: RampConfig = field(default_factory=RampConfig)
     carve_depth: float = 0.006
     carve_plane: float = 0.004
     carve_behind: float = 0.01

@@ -114,6 +114,16 @@ class Frame:
         vars(frame).pop("object_ids", None)
         return frame
 
+    def with_points(self, points: NDArray[np.float32]) -> Frame:
+        """The same image with other points (H, W, 3), metres, camera frame, at the same pixels.
+        Unlike `dataclasses.replace` it copies nothing, and makes the points read-only."""
+        points.setflags(write=False)
+        frame = copy(self)
+        object.__setattr__(frame, "points", points)
+        for derived in ("valid", "depth"):
+            vars(frame).pop(derived, None)
+        return frame
+
     def object_points(self, object_id: int) -> NDArray[np.float32]:
         """(n, 3) valid points of one object, metres, camera frame."""
         # By number: a mask over three axes is looked up three times as slowly.

@@ -201,11 +201,13 @@ def reconstruct_by_hypotheses(
             observation,
             frame,
             plane,
+            noise,
             wave,
             shapes,
             shared[kept] / shared[kept].sum(),
             hypotheses,
             views,
+            surface_cell=config.observation.surface_cell,
             seed=seed,
             device=device,
         )

@@ -15,7 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import map_coordinates
 
-from brrp_cli.completion.completed_mean import crust_of, empty_space
+from brrp_cli.completion.completed_mean import empty_space
+from brrp_cli.completion.seen_surface import Bounds, SeenSurface, seen_surface
 from brrp_cli.config import HypothesesConfig, MeanConfig
 from brrp_cli.config.tracking import SharpenConfig
 from brrp_cli.frames.frame import Frame
@@ -90,6 +91,7 @@ class Remembered:
     placed: tuple[Placed, ...]
     ratios: dict[str, float]
     guess: Guess | None
+    surface: SeenSurface
     alone: bool
 
 
@@ -133,6 +135,7 @@ def remember(
         ),
         ratios,
         guess,
+        seen_surface(frame, observation.object_id, plane, noise, config.mean.ramp),
         alone,
     )
 
@@ -255,13 +258,11 @@ class EarlierViews:
             found |= empty_space(then, m.frame, m.object_id, m.plane, config)
         return found
 
-    def crust(self, points: Array, shell: float, config: MeanConfig) -> NDArray[np.bool_]:
-        """Which of points (n, 3), metres, camera frame, lie in what any of them saw."""
-        found = np.zeros(len(points), bool)
-        for view in self.views:
-            then, m = _moved(view.T_then_now, points), view.memory
-            found |= crust_of(then, m.frame, m.object_id, shell, config)
-        return found
+    def bounds(self, points: Array, shell: float, config: MeanConfig) -> list[Bounds]:
+        """Of the logits at points (n, 3), metres, camera frame, by what each of them saw."""
+        return [
+            v.memory.surface.bounds(_moved(v.T_then_now, points), shell, config) for v in self.views
+        ]
 
     def averaged(self, logits: NDArray[np.float32], points: Array) -> NDArray[np.float32]:
         """The network's logits (n,) at points (n, 3), metres, camera frame: the mean of all views'

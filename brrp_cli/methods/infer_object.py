@@ -8,12 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brrp_cli.completion.completed_mean import (
-    crust_of,
     empty_space,
     network_grid,
     shell_of,
-    with_crust,
+    within,
 )
+from brrp_cli.completion.seen_surface import SeenSurface, joined, seen_surface
 from brrp_cli.completion.visible_part import VisiblePart, visible_part
 from brrp_cli.config import HypothesesConfig, MeanConfig
 from brrp_cli.frames.frame import Frame
@@ -23,6 +23,7 @@ from brrp_cli.inference.mean_grid import MeanGrid, grid_over
 from brrp_cli.inference.placed_shape import PlacedShape
 from brrp_cli.inference.posterior import LOGISTIC_DEVIATION
 from brrp_cli.methods.earlier_views import ALONE, EarlierViews, Guess
+from brrp_cli.observation.pixel_noise import PixelNoise
 from brrp_cli.observation.ray_samples import ObjectObservation
 from brrp_cli.observation.sensor_noise import depth_deviation
 from brrp_cli.observation.soft_samples import soft_samples
@@ -38,12 +39,14 @@ def infer_object(
     observation: ObjectObservation,
     frame: Frame,
     plane: Plane | None,
+    noise: PixelNoise,
     wave: float,
     shapes: list[PlacedShape],
     weights: Array,
     config: HypothesesConfig,
     views: EarlierViews,
     *,
+    surface_cell: float,
     seed: int,
     device: str,
 ) -> tuple[HypothesisPosterior, Guess | None]:
@@ -51,10 +54,15 @@ def infer_object(
     None where the completion weighs nothing.
 
     wave : metres, as in `reconstruct_by_hypotheses`; weights : (C,) of the shapes and, where there
-    is one more, of the completion; views : of earlier frames, none of a frame that stands alone
+    is one more, of the completion; views : of earlier frames, none of a frame that stands alone;
+    surface_cell : metres, of the grid in which samples of the seen surface are thinned
     """
-    part, guess = None, None
+    part, guess, surface = None, None, None
     if len(shapes) < len(weights):
+        surface = seen_surface(frame, observation.object_id, plane, noise, config.mean.ramp)
+        frame = surface.frame
+        points = frame.object_points(observation.object_id)
+        observation = observation.with_points(points, surface_cell)
         part = visible_part(
             observation.points, frame, observation.object_id, plane, config.completion
         )
@@ -65,15 +73,15 @@ def infer_object(
     margin = config.map.margin
     box = np.stack([extent.min(axis=0) - margin, extent.max(axis=0) + margin])
     means: list[MeanFunction] = list(shapes)
-    if part is not None:
-        completed, guess = _completed(part, box, plane, config.mean, views)
+    if part is not None and surface is not None:
+        completed, guess = _completed(part, surface, box, plane, config.mean, views)
         means.append(completed)
     stiffness = np.ones(len(means))
     stiffness[: len(shapes)] = config.map.stiffness
     samples = views.joined(soft_samples(observation, frame, config.map.behind, config.sensor))
-    noise = config.sensor.sure * depth_deviation(observation.center[2:], config.sensor)[0]
+    deviation = config.sensor.sure * depth_deviation(observation.center[2:], config.sensor)[0]
     posterior = infer_correction(
-        Problem(samples, tuple(means), weights, stiffness, noise, box, wave),
+        Problem(samples, tuple(means), weights, stiffness, deviation, box, wave),
         config.map,
         seed=child_seed(seed, observation.object_id),
         device=device,
@@ -114,6 +122,7 @@ def placed_shape(
 
 def _completed(
     part: VisiblePart,
+    surface: SeenSurface,
     box: Array,
     plane: Plane | None,
     config: MeanConfig,
@@ -126,10 +135,9 @@ def _completed(
     empty = (empty | views.empty(points, config)).reshape(nodes.shape[:3])
     alone = network_grid(nodes, empty, part, config)
     shell, left = shell_of(nodes, config), nodes[~empty]
-    crust = crust_of(left, part.frame, part.object_id, shell, config)
-    crust |= views.crust(left, shell, config)
+    bounds = [surface.bounds(left, shell, config), *views.bounds(left, shell, config)]
     every = alone.copy()
     every[~empty] = views.averaged(alone[~empty], left)
-    logits = with_crust(every, empty, crust, config)
+    logits = within(every, empty, joined(bounds), config)
     guess = Guess(lower, spacing, np.where(empty, np.nan, alone).astype(np.float16))
     return MeanGrid(lower, spacing, logits, outside=-config.limit), guess

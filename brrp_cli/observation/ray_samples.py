@@ -7,7 +7,7 @@ space below the support plane and the surfaces of other objects are free.
 from __future__ import annotations
 
 import logging
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,6 +36,14 @@ class ObjectObservation:
     center: NDArray[np.float64]
     samples: NDArray[np.float32]
     labels: NDArray[np.bool_]
+
+    def with_points(self, points: NDArray[np.float32], cell: float) -> ObjectObservation:
+        """The same with other points (n, 3) of its surface, thinned to samples on a grid of `cell`
+        metres."""
+        occupied = grid_subsample(points, cell)
+        samples = np.concatenate([occupied, self.samples[~self.labels]])
+        labels = np.arange(len(samples)) < len(occupied)
+        return replace(self, points=points, samples=samples, labels=labels)
 
 
 @dataclass(frozen=True)

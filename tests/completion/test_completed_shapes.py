@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 import trimesh
-from table_scene import T_WORLD_CAM, TABLE, box, in_camera, photograph, placed
+from table_scene import T_WORLD_CAM, TABLE, box, in_camera, photograph, placed, surface_seen
 
 from brrp_cli.completion.completed_mean import completed_grid, empty_space
 from brrp_cli.completion.visible_part import visible_part
@@ -25,7 +25,8 @@ def completed_mesh(meshes, object_id=5):
     around = np.stack([part.extent.min(axis=0) - margin, part.extent.max(axis=0) + margin])
     lower, spacing, nodes = grid_over(around, 60_000)
     empty = empty_space(nodes.reshape(-1, 3), frame, object_id, TABLE, hypotheses.mean)
-    logits = completed_grid(nodes, empty.reshape(nodes.shape[:3]), part, hypotheses.mean)
+    surface = surface_seen(frame, object_id)
+    logits = completed_grid(nodes, empty.reshape(nodes.shape[:3]), part, surface, hypotheses.mean)
     occupancy = 1 / (1 + np.exp(-logits.astype(np.float64)))
     axes = tuple(lower[i] + spacing * np.arange(nodes.shape[i]) for i in range(3))
     found = level_set(occupancy, axes, seen, 0.5, CONFIG.surface)

@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from table_scene import TABLE, box, in_camera, photograph, placed
+from table_scene import TABLE, box, in_camera, photograph, placed, surface_seen
 
-from brrp_cli.completion.completed_mean import completed_grid, empty_space
+from brrp_cli.completion.completed_mean import completed_grid, empty_space, network_grid
 from brrp_cli.completion.learned import LearnedShape, shapes
 from brrp_cli.completion.network import Network, fitted, from_bytes
 from brrp_cli.completion.point_features import COUNT, point_features
@@ -21,8 +21,6 @@ from brrp_cli.observation.support_plane import Plane
 from brrp_cli.shapes import solids
 
 CONFIG, MEAN = CompletionConfig(), MeanConfig()
-# What the network says, without a crust.
-BARE = replace(MEAN, shell=0.0, shell_nodes=0.0, shell_before=0.0)
 
 
 def photographed(mesh, T_cam_mesh):
@@ -41,7 +39,7 @@ def completed(frame, config=MEAN, margin=0.05):
     box = np.stack([extent.min(axis=0) - margin, extent.max(axis=0) + margin])
     lower, spacing, nodes = grid_over(box, config.nodes)
     empty = empty_space(nodes.reshape(-1, 3), frame, 5, TABLE, config).reshape(nodes.shape[:3])
-    logits = completed_grid(nodes, empty, part, config)
+    logits = completed_grid(nodes, empty, part, surface_seen(frame, 5), config)
     return nodes, MeanGrid(lower, spacing, logits, -config.limit), empty
 
 
@@ -94,26 +92,31 @@ def test_a_cup_that_is_looked_into_stays_hollow():
 
 
 def test_what_is_seen_has_some_thickness_whatever_the_network_says():
+    """And no more in front: the surface is where it was seen."""
     frame = photographed(solids.beaker(0.04, 0.04, 0.06, 0.004), placed(0.0, 0.0, 0.0))
-    nodes, crusted, empty = completed(frame)
-    _, bare, _ = completed(frame, BARE)
-    with_crust, without = (
-        grid.values.astype(float).ravel()[~empty.ravel()] for grid in (crusted, bare)
-    )
-    points = nodes.reshape(-1, 3)[~empty.ravel()]
-    behind = -depth_behind(points, frame)
-    thickness = max(MEAN.shell, MEAN.shell_nodes * crusted.spacing)
+    nodes, mean, empty = completed(frame)
+    thinks = network_grid(nodes, empty, part_of(frame), MEAN)[~empty]
+    points, found = nodes[~empty], mean.values.astype(float)[~empty]
+    surface = surface_seen(frame, 5)
+    behind = -depth_behind(points, surface.frame)
+    thickness = max(MEAN.shell, MEAN.shell_nodes * mean.spacing)
     own = at_pixels(points, frame.segmap, frame) == 5
-    seen = own & (behind > -MEAN.shell_before) & (behind < thickness)
-    assert (without[seen] < 0).any()
-    assert (with_crust[seen] >= MEAN.shell_logit).all()
-    np.testing.assert_array_equal(with_crust[~seen], without[~seen])
+    wall = own & (behind > MEAN.ramp.width) & (behind < thickness - surface.nearer)
+    assert (thinks[wall] < 0).any()
+    assert (found[wall] >= MEAN.shell_logit).all()
+    front = own & (at_pixels(points, surface.sure, frame) == 1) & (behind < -0.0001)
+    assert (thinks[front] > 0).any()
+    assert (found[front] < 0).all()
+    elsewhere = ~(own & (behind < thickness))
+    np.testing.assert_allclose(
+        found[elsewhere], thinks[elsewhere].clip(-MEAN.limit, MEAN.limit), atol=0.005
+    )
 
 
 @pytest.mark.parametrize(("nodes", "learned"), [(20_000, False), (60_000, False), (20_000, True)])
 def test_the_lattice_is_the_networks_where_it_counts(nodes, learned):
     frame = photographed(box(), placed(0.0, 0.0, 0.3))
-    config = replace(BARE, nodes=nodes)
+    config = replace(MEAN, nodes=nodes)
     part = part_of(frame, config=replace(CONFIG, learned=learned, largest=1.0))
     extent = part.extent
     around = np.stack([extent.min(axis=0) - 0.01, extent.max(axis=0) + 0.01])
@@ -127,15 +130,16 @@ def test_the_lattice_is_the_networks_where_it_counts(nodes, learned):
         exact = fitted().logits(point_features(every, part))
     exact = exact.reshape(at.shape[:3])
     nothing, everything = np.zeros(at.shape[:3], bool), np.ones(at.shape[:3], bool)
-    found = completed_grid(at, nothing, part, config).astype(float)
-    # Half precision; a node on the edge of a pixel may fall on either side.
+    found = network_grid(at, nothing, part, config).clip(-config.limit, config.limit)
+    # A node on the edge of a pixel may fall on either side.
     near = np.abs(found - exact.clip(-config.limit, config.limit)) < 0.01
     assert near[::2, ::2, ::2].mean() > 0.99
     doubtful = np.abs(exact) < 1
     assert doubtful.sum() > 200
     assert near[doubtful].mean() > 0.99 and ((found > 0) == (exact > 0)).mean() > 0.998
     assert not near.all(), "not all nodes are asked"
-    assert (completed_grid(at, everything, part, config) == -config.limit).all()
+    surface = surface_seen(part.frame, 5)
+    assert (completed_grid(at, everything, part, surface, config) == -config.limit).all()
 
 
 def test_a_part_has_the_extents_of_what_is_seen():

@@ -9,7 +9,7 @@ import pytest
 import torch
 import trimesh
 from safetensors.torch import save_file
-from table_scene import TABLE, ball, in_camera, photograph, placed
+from table_scene import TABLE, ball, in_camera, photograph, placed, surface_seen
 
 from brrp_cli.completion.completed_mean import completed_grid, empty_space
 from brrp_cli.completion.learned import LearnedShape, load_shapes, save_shapes
@@ -85,7 +85,8 @@ def test_the_ball_of_which_a_half_is_seen_is_whole_and_comes_out_the_same_twice(
     box = np.stack([seen.extent.min(axis=0) - 0.03, seen.extent.max(axis=0) + 0.03])
     lower, spacing, nodes = grid_over(box, 40_000)
     empty = empty_space(nodes.reshape(-1, 3), seen.frame, 5, TABLE, mean).reshape(nodes.shape[:3])
-    logits, again = (completed_grid(nodes, empty, seen, mean) for _ in range(2))
+    depth = surface_seen(seen.frame, 5)
+    logits, again = (completed_grid(nodes, empty, seen, depth, mean) for _ in range(2))
     assert logits.tobytes() == again.tobytes()
     occupancy = 1 / (1 + np.exp(-logits.astype(np.float64)))
     axes = tuple(lower[i] + spacing * np.arange(nodes.shape[i]) for i in range(3))

@@ -157,4 +157,4 @@ def _nothing():
     from brrp_cli.methods.earlier_views import Remembered
 
     none = np.zeros(0)
-    return Remembered(None, ID, None, none, None, None, 0.0, none, (), {}, None, False)
+    return Remembered(None, ID, None, none, None, None, 0.0, none, (), {}, None, None, False)

@@ -13,10 +13,12 @@ from tempfile import TemporaryDirectory
 import numpy as np
 import trimesh
 
-from brrp_cli.config import FeatureConfig
+from brrp_cli.completion.seen_surface import SeenSurface, seen_surface
+from brrp_cli.config import FeatureConfig, preset
 from brrp_cli.demo.layout import camera_pose, turn
 from brrp_cli.frames.frame import Frame
 from brrp_cli.geometry import backproject, similarity
+from brrp_cli.observation.pixel_noise import pixel_noise
 from brrp_cli.observation.support_plane import Plane
 from brrp_cli.prior.build.find_meshes import MeshSource
 from brrp_cli.prior.build.make_object import make_object
@@ -95,6 +97,13 @@ def in_camera(mesh: trimesh.Trimesh, T_cam_mesh: np.ndarray) -> trimesh.Trimesh:
     copy = mesh.copy()
     copy.apply_transform(T_cam_mesh)
     return copy
+
+
+def surface_seen(frame: Frame, object_id: int) -> SeenSurface:
+    """What the completion takes from a frame's depth of an object on the table."""
+    hypotheses = preset("default").hypotheses
+    noise = pixel_noise(frame, TABLE, hypotheses.sensor)
+    return seen_surface(frame, object_id, TABLE, noise, hypotheses.mean.ramp)
 
 
 def photograph(things: Mapping[int, trimesh.Trimesh], *, table: bool = True) -> Frame:

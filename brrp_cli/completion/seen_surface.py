@@ -1,0 +1,94 @@
+"""What the depth of an object says of its surface: bounds of the completion's logit.
+
+What was seen is a surface, to within the noise: the logit is 0 there, and a ramp about it. Behind
+it the ramp is the least that the logit may be, for as thick as the thinnest wall; so a wall is
+there however thin the network makes it. In front of it the ramp is what the logit is, where the
+depth is the object's own beyond doubt. Elsewhere it says nothing: sensors mix both sides of a jump
+of depth, and flatten what lies on a table. There the surface is taken to be a little nearer than it
+was measured.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brrp_cli.config import MeanConfig, RampConfig
+from brrp_cli.frames.frame import Frame
+from brrp_cli.frames.projection import at_pixels, depth_behind
+from brrp_cli.observation.pixel_noise import PixelNoise
+from brrp_cli.observation.smooth_depth import smoothed
+from brrp_cli.observation.support_plane import Plane
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Bounds:
+    """Logits (n,), the least and the most that they may be."""
+
+    least: Array
+    most: Array
+
+    def applied(self, logits: NDArray[np.floating]) -> Array:
+        """Logits (n,) within the bounds; between them where they contradict each other."""
+        middle = (self.least + self.most) / 2
+        against = self.least > self.most
+        low, high = (np.where(against, middle, each) for each in (self.least, self.most))
+        return np.asarray(np.clip(logits, low, high))
+
+
+@dataclass(frozen=True)
+class SeenSurface:
+    """frame : with the object's depth smoothed; sure : (H, W) bool, the object's pixels whose
+    depth is its own surface beyond doubt; nearer : metres, by which the surface lies in front of
+    the other pixels' depth"""
+
+    frame: Frame
+    object_id: int
+    sure: NDArray[np.bool_]
+    nearer: float
+
+    def bounds(self, points: Array, shell: float, config: MeanConfig) -> Bounds:
+        """At points (n, 3), metres, camera frame; shell : metres, how thick what was seen is."""
+        behind = -depth_behind(points, self.frame)
+        own = at_pixels(points, self.frame.segmap, self.frame) == self.object_id
+        own &= np.isfinite(behind)
+        sure = at_pixels(points, self.sure, self.frame) == 1
+        behind += np.where(sure, 0.0, self.nearer)
+        ramp = config.shell_logit / config.ramp.width * np.clip(behind, -shell, shell)
+        front = own & sure & (behind < 0)
+        told = own & (behind < shell) & np.where(front, behind > -shell, behind >= 0)
+        return Bounds(
+            np.where(told, np.maximum(ramp, -config.limit), -config.limit),
+            np.where(front, np.maximum(ramp, -config.limit), config.limit),
+        )
+
+
+def seen_surface(
+    frame: Frame, object_id: int, plane: Plane | None, noise: PixelNoise, config: RampConfig
+) -> SeenSurface:
+    """Of an object in a frame as it was measured."""
+    from scipy.ndimage import binary_erosion
+
+    own = frame.segmap == object_id
+    margin = max(1, round(config.margin * frame.K[0, 0]))
+    sure = np.asarray(binary_erosion(own, iterations=margin)) & ~noise.at_jump
+    smooth = smoothed(frame, object_id, noise, config.smooth)
+    seen = smooth.depth[own & frame.valid]
+    wave = noise.wave_at(float(np.median(seen))) if len(seen) else 0.0
+    if plane is not None:
+        with np.errstate(invalid="ignore"):
+            sure &= plane.signed_distance(smooth.points) > config.rise * wave
+    return SeenSurface(smooth, object_id, sure, config.nearer * wave)
+
+
+def joined(bounds: Sequence[Bounds]) -> Bounds:
+    """Of several views of one object."""
+    return Bounds(
+        np.max([each.least for each in bounds], axis=0),
+        np.min([each.most for each in bounds], axis=0),
+    )
