@@ -12,7 +12,7 @@ from scipy.ndimage import binary_dilation, maximum_filter, minimum_filter
 
 from brrp_cli.completion.network import fitted
 from brrp_cli.completion.point_features import point_features
-from brrp_cli.completion.seen_surface import Bounds, SeenSurface
+from brrp_cli.completion.seen_surface import Bounds
 from brrp_cli.completion.usual_size import of_usual_size
 from brrp_cli.completion.visible_part import VisiblePart
 from brrp_cli.config import MeanConfig
@@ -23,20 +23,6 @@ from brrp_cli.observation.support_plane import Plane
 
 Array = NDArray[np.float64]
 Floats = NDArray[np.float32]
-
-
-def completed_grid(
-    nodes: Array,
-    empty: NDArray[np.bool_],
-    part: VisiblePart,
-    surface: SeenSurface,
-    config: MeanConfig,
-) -> NDArray[np.float16]:
-    """Logits (nx, ny, nz) at nodes (nx, ny, nz, 3), metres, camera frame, of an object that is none
-    of the stored ones; the least where it is empty."""
-    guess = network_grid(nodes, empty, part, config)
-    bounds = surface.bounds(nodes[~empty], shell_of(nodes, config), config)
-    return within(guess, empty, bounds, config)
 
 
 def network_grid(

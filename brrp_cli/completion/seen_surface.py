@@ -19,8 +19,8 @@ from numpy.typing import NDArray
 from brrp_cli.config import MeanConfig, RampConfig
 from brrp_cli.frames.frame import Frame
 from brrp_cli.frames.projection import at_pixels, depth_behind
+from brrp_cli.observation.fitted_depth import smoothed
 from brrp_cli.observation.pixel_noise import PixelNoise
-from brrp_cli.observation.smooth_depth import smoothed
 from brrp_cli.observation.support_plane import Plane
 
 Array = NDArray[np.float64]
@@ -77,7 +77,7 @@ def seen_surface(
     own = frame.segmap == object_id
     margin = max(1, round(config.margin * frame.K[0, 0]))
     sure = np.asarray(binary_erosion(own, iterations=margin)) & ~noise.at_jump
-    smooth = smoothed(frame, object_id, noise, config.smooth)
+    smooth = smoothed(frame, object_id, noise, config.depth)
     seen = smooth.depth[own & frame.valid]
     wave = noise.wave_at(float(np.median(seen))) if len(seen) else 0.0
     if plane is not None:

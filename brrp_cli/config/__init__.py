@@ -13,11 +13,11 @@ from typing import Any
 from brrp_cli.config.baselines import CoarseToFineConfig, PointSDFConfig, VPrismConfig
 from brrp_cli.config.inference import (
     CompletionConfig,
+    FittedDepthConfig,
     FittedMapConfig,
     InferenceConfig,
     MeanConfig,
     RampConfig,
-    SmoothConfig,
     VolumeConfig,
 )
 from brrp_cli.config.kin import KinConfig
@@ -44,6 +44,7 @@ __all__ = [
     "CompletionConfig",
     "Config",
     "FeatureConfig",
+    "FittedDepthConfig",
     "FittedMapConfig",
     "HypothesesConfig",
     "InferenceConfig",
@@ -58,7 +59,6 @@ __all__ = [
     "RetrievalConfig",
     "SearchConfig",
     "SensorConfig",
-    "SmoothConfig",
     "StrayConfig",
     "SurfaceConfig",
     "TurnConfig",

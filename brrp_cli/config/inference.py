@@ -25,16 +25,19 @@ class InferenceConfig:
 
 
 @dataclass(frozen=True)
-class SmoothConfig:
-    """Depth of an object without the sensor's noise (brrp_cli/observation/smooth_depth.py).
+class FittedDepthConfig:
+    """Depth of an object without the sensor's noise (brrp_cli/observation/fitted_depth.py).
 
-    reaches : metres, radii of the neighbourhoods to which planes are fitted; most_pixels : of them
+    reaches : metres, radii of the neighbourhoods to which curved surfaces are fitted, which have
+    `least_pixels` at least (one pixel has four neighbours, too few to tell noise from shape) and
+    `most_pixels` at most
     gate : deviations from the plane before, beyond which a neighbour has no say
-    fit : a plane fits if the variance about it is at most so many times that of the noise
+    fit : a surface fits if the variance about it is at most so many times that of the noise
     wave : share of the sensor's waves that counts as noise beside that of single pixels
     """
 
     reaches: tuple[float, float, float] = (0.003, 0.006, 0.012)
+    least_pixels: int = 2
     most_pixels: int = 12
     gate: float = 3.0
     fit: float = 1.2
@@ -45,7 +48,7 @@ class SmoothConfig:
 class RampConfig:
     """The logit about what was seen (brrp_cli/completion/seen_surface.py).
 
-    width : metres, on either side of it
+    width : metres behind it where the logit is `shell_logit`; it is 0 on it
     margin : radians from the mask's outline within which depth may be another thing's
     rise : waves of the sensor above the plane, under which depth may be the plane's
     nearer : waves by which the surface is nearer than measured where depth may be another thing's
@@ -55,7 +58,7 @@ class RampConfig:
     margin: float = 0.0042
     rise: float = 4.0
     nearer: float = between(1.0, 0.0, 10.0)
-    smooth: SmoothConfig = field(default_factory=SmoothConfig)
+    depth: FittedDepthConfig = field(default_factory=FittedDepthConfig)
 
 
 @dataclass(frozen=True)
@@ -66,11 +69,11 @@ class MeanConfig:
     within `exact` metres of its surface; an alignment score under `sure` widens it by `doubt`
     metres for each unit. An object that none explains is completed on a grid of about `nodes` nodes
     by a network, which is evaluated at every node where the coarse ones around are not all
-    `beyond_doubt`; about what is seen of it its logit is a `ramp` up to `shell_logit`, at least for
-    `shell` metres behind, or `shell_nodes` of the grid's spacings where these are longer. Space is
-    empty that lies more than `carve_depth` in front of the measured depth, or
-    `carve_plane` below the plane, or less than `carve_behind` behind what is no object's and more
-    than `carve_pixels` from the mask.
+    `beyond_doubt`; about what is seen of it its logit is a `ramp` as steep as `shell_logit` says,
+    for `shell` metres, or `shell_nodes` of the grid's spacings where these are longer. Space is
+    empty that lies more than `carve_depth` in front of the measured depth, or `carve_plane` below
+    the plane, or less than `carve_behind` behind what is no object's and more than `carve_pixels`
+    from the mask.
     """
 
     nodes: int = 200_000

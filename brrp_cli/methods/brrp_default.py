@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import partial
+from functools import cache, partial
 from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
+from brrp_cli.completion.seen_surface import SeenSurface, seen_surface
 from brrp_cli.config import FittedMapConfig, HypothesesConfig
 from brrp_cli.config.registration import TrialConfig
 from brrp_cli.methods.earlier_views import ALONE, EarlierViews, remember
@@ -174,6 +175,11 @@ def reconstruct_by_hypotheses(
                 views.points(),
                 views.depths(),
             )
+
+    @cache
+    def surface() -> SeenSurface:
+        return seen_surface(frame, object_id, plane, noise, hypotheses.mean.ramp)
+
     with timed(seconds, "inference"):
         shared = _shared_with_kin(weights, like)
         kept = _kept(shared, hypotheses.map)
@@ -201,7 +207,7 @@ def reconstruct_by_hypotheses(
             observation,
             frame,
             plane,
-            noise,
+            surface,
             wave,
             shapes,
             shared[kept] / shared[kept].sum(),
@@ -224,6 +230,7 @@ def reconstruct_by_hypotheses(
             [(each, float(weight)) for each, weight in zip(placed, weights, strict=False)],
             best_ratios(placed, alone),
             guess,
+            surface(),
             not views,
             views.config.samples,
             child_rng(seed, "remembered", object_id),

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import map_coordinates
 
 from brrp_cli.completion.completed_mean import empty_space
-from brrp_cli.completion.seen_surface import Bounds, SeenSurface, seen_surface
+from brrp_cli.completion.seen_surface import Bounds, SeenSurface
 from brrp_cli.config import HypothesesConfig, MeanConfig
 from brrp_cli.config.tracking import SharpenConfig
 from brrp_cli.frames.frame import Frame
@@ -106,6 +106,7 @@ def remember(
     placed: Sequence[tuple[Hypothesis, float]],
     ratios: dict[str, float],
     guess: Guess | None,
+    surface: SeenSurface,
     alone: bool,
     most_samples: int,
     rng: np.random.Generator,
@@ -135,7 +136,7 @@ def remember(
         ),
         ratios,
         guess,
-        seen_surface(frame, observation.object_id, plane, noise, config.mean.ramp),
+        surface,
         alone,
     )
 

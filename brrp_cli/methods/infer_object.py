@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -13,7 +14,7 @@ from brrp_cli.completion.completed_mean import (
     shell_of,
     within,
 )
-from brrp_cli.completion.seen_surface import SeenSurface, joined, seen_surface
+from brrp_cli.completion.seen_surface import SeenSurface, joined
 from brrp_cli.completion.visible_part import VisiblePart, visible_part
 from brrp_cli.config import HypothesesConfig, MeanConfig
 from brrp_cli.frames.frame import Frame
@@ -23,7 +24,6 @@ from brrp_cli.inference.mean_grid import MeanGrid, grid_over
 from brrp_cli.inference.placed_shape import PlacedShape
 from brrp_cli.inference.posterior import LOGISTIC_DEVIATION
 from brrp_cli.methods.earlier_views import ALONE, EarlierViews, Guess
-from brrp_cli.observation.pixel_noise import PixelNoise
 from brrp_cli.observation.ray_samples import ObjectObservation
 from brrp_cli.observation.sensor_noise import depth_deviation
 from brrp_cli.observation.soft_samples import soft_samples
@@ -39,7 +39,7 @@ def infer_object(
     observation: ObjectObservation,
     frame: Frame,
     plane: Plane | None,
-    noise: PixelNoise,
+    seen: Callable[[], SeenSurface],
     wave: float,
     shapes: list[PlacedShape],
     weights: Array,
@@ -53,13 +53,14 @@ def infer_object(
     """The posterior, camera frame, and what the completion's network thinks of this view alone;
     None where the completion weighs nothing.
 
+    seen : the object's surface in the frame, which the completion needs
     wave : metres, as in `reconstruct_by_hypotheses`; weights : (C,) of the shapes and, where there
     is one more, of the completion; views : of earlier frames, none of a frame that stands alone;
     surface_cell : metres, of the grid in which samples of the seen surface are thinned
     """
     part, guess, surface = None, None, None
     if len(shapes) < len(weights):
-        surface = seen_surface(frame, observation.object_id, plane, noise, config.mean.ramp)
+        surface = seen()
         frame = surface.frame
         points = frame.object_points(observation.object_id)
         observation = observation.with_points(points, surface_cell)

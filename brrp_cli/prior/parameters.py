@@ -63,12 +63,15 @@ class RepairConfig:
     alpha : the wrap's probe enters every opening that is wider; offset : its surface lies so far
     outside, before it is laid onto the mesh
     wall : what is left around a sheet, so that one of 25 cm becomes a wall of 1.25 mm
+    spanning : no share, a cosine between the way to the mesh's nearest point and the way inward;
+    below it the wrap spans an opening, and the nearest point is on its rim
     """
 
     small_hole: float = 0.1
     alpha: float = 0.02
     offset: float = 0.005
     wall: float = 0.005
+    spanning: float = 0.5
 
 
 @dataclass(frozen=True)

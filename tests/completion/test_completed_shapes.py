@@ -3,9 +3,18 @@
 import numpy as np
 import pytest
 import trimesh
-from table_scene import T_WORLD_CAM, TABLE, box, in_camera, photograph, placed, surface_seen
+from table_scene import (
+    T_WORLD_CAM,
+    TABLE,
+    box,
+    completed_grid,
+    in_camera,
+    photograph,
+    placed,
+    surface_seen,
+)
 
-from brrp_cli.completion.completed_mean import completed_grid, empty_space
+from brrp_cli.completion.completed_mean import empty_space
 from brrp_cli.completion.visible_part import visible_part
 from brrp_cli.config import preset
 from brrp_cli.inference.mean_grid import grid_over

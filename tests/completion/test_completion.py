@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from table_scene import TABLE, box, in_camera, photograph, placed, surface_seen
+from table_scene import TABLE, box, completed_grid, in_camera, photograph, placed, surface_seen
 
-from brrp_cli.completion.completed_mean import completed_grid, empty_space, network_grid
+from brrp_cli.completion.completed_mean import empty_space, network_grid
 from brrp_cli.completion.learned import LearnedShape, shapes
 from brrp_cli.completion.network import Network, fitted, from_bytes
 from brrp_cli.completion.point_features import COUNT, point_features

@@ -9,9 +9,9 @@ import pytest
 import torch
 import trimesh
 from safetensors.torch import save_file
-from table_scene import TABLE, ball, in_camera, photograph, placed, surface_seen
+from table_scene import TABLE, ball, completed_grid, in_camera, photograph, placed, surface_seen
 
-from brrp_cli.completion.completed_mean import completed_grid, empty_space
+from brrp_cli.completion.completed_mean import empty_space
 from brrp_cli.completion.learned import LearnedShape, load_shapes, save_shapes
 from brrp_cli.completion.shape_network import ShapeNetwork, ShapeNetworkConfig
 from brrp_cli.completion.visible_part import visible_part

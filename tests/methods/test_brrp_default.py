@@ -233,7 +233,6 @@ def test_the_first_frame_of_a_stream_is_as_a_frame_alone(result, folder, truth):
 
 
 @pytest.mark.slow
-@pytest.mark.xfail(strict=True, reason="since the newer weights: 1.60 mm alone, 0.91 mm with both")
 def test_the_view_of_the_other_side_halves_the_error_of_what_was_not_seen(folder):
     """Of a bar that the prior does not hold: the second view knows what the first one saw."""
     strange = in_camera(solids.box(0.20, 0.05, 0.05), placed(0.0, 0.0, 1.3))

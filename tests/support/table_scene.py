@@ -13,8 +13,10 @@ from tempfile import TemporaryDirectory
 import numpy as np
 import trimesh
 
+from brrp_cli.completion.completed_mean import network_grid, shell_of, within
 from brrp_cli.completion.seen_surface import SeenSurface, seen_surface
-from brrp_cli.config import FeatureConfig, preset
+from brrp_cli.completion.visible_part import VisiblePart
+from brrp_cli.config import FeatureConfig, MeanConfig, preset
 from brrp_cli.demo.layout import camera_pose, turn
 from brrp_cli.frames.frame import Frame
 from brrp_cli.geometry import backproject, similarity
@@ -104,6 +106,18 @@ def surface_seen(frame: Frame, object_id: int) -> SeenSurface:
     hypotheses = preset("default").hypotheses
     noise = pixel_noise(frame, TABLE, hypotheses.sensor)
     return seen_surface(frame, object_id, TABLE, noise, hypotheses.mean.ramp)
+
+
+def completed_grid(
+    nodes: np.ndarray,
+    empty: np.ndarray,
+    part: VisiblePart,
+    surface: SeenSurface,
+    config: MeanConfig,
+) -> np.ndarray:
+    """Logits (nx, ny, nz) of the completion of one view at nodes (nx, ny, nz, 3)."""
+    bounds = surface.bounds(nodes[~empty], shell_of(nodes, config), config)
+    return within(network_grid(nodes, empty, part, config), empty, bounds, config)
 
 
 def photograph(things: Mapping[int, trimesh.Trimesh], *, table: bool = True) -> Frame:

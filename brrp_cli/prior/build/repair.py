@@ -168,7 +168,8 @@ def _wrap(mesh: trimesh.Trimesh, config: RepairConfig) -> tuple[trimesh.Trimesh,
             f"; openings up to {widest * 1e3:.0f} mm across stay open,"
             f" sheets are walls of {wall * 1e3:.1f} mm"
         )
-    return settled(wrapped, mesh, config.offset * diagonal, wall), [step]
+    laid = settled(wrapped, mesh, config.offset * diagonal, wall, config.spanning)
+    return laid, [step]
 
 
 def boundary_rims(mesh: trimesh.Trimesh) -> list[np.ndarray]:

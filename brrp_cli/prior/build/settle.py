@@ -12,23 +12,24 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from brrp_cli.dependencies import import_open3d
+from brrp_cli.raycast import raycasting_scene
 
 if TYPE_CHECKING:
     import trimesh
 
-# Cosine between the way to the nearest point and the way inward. Below it the wrap spans an
-# opening, and the nearest point is its rim.
-BELOW = 0.5
 # Share of the offset: a vertex that is nearer to the surface lies on it, and a ray starts so far
 # below its vertex, past the faces that meet there.
 PAST = 0.1
 
 
 def settled(
-    wrap: trimesh.Trimesh, surface: trimesh.Trimesh, offset: float, wall: float
+    wrap: trimesh.Trimesh, surface: trimesh.Trimesh, offset: float, wall: float, spanning: float
 ) -> trimesh.Trimesh:
     """The closed mesh `wrap` with its vertices moved inward onto `surface`, by no more than leaves
-    it `wall` thick. Over openings it sinks by `offset`. All in one frame, lengths in its unit."""
+    it `wall` thick. All in one frame, lengths in its unit.
+
+    offset, spanning : as in RepairConfig, `offset` in the unit; over openings the wrap sinks by it
+    """
     import trimesh
 
     # Between its vertices a face cuts the surface's edges off.
@@ -36,10 +37,10 @@ def settled(
     vertices, inward = np.asarray(finer.vertices), -np.asarray(finer.vertex_normals)
     way = _nearest(surface, vertices) - vertices
     length = np.linalg.norm(way, axis=1, keepdims=True)
-    below = np.einsum("nc,nc->n", way, inward) >= BELOW * length[:, 0]
-    spans = ~below & (length[:, 0] > PAST * offset)
+    below = np.einsum("nc,nc->n", way, inward) >= spanning * length[:, 0]
+    rims = ~below & (length[:, 0] > PAST * offset)
     way /= np.maximum(length, 1e-12)
-    way[spans], length[spans] = inward[spans], offset
+    way[rims], length[rims] = inward[rims], offset
     room = (_thickness(wrap, vertices, way, PAST * offset) - wall) / 2
     moved = vertices + way * np.clip(length[:, 0], 0.0, np.maximum(room, 0.0))[:, None]
     return trimesh.Trimesh(moved, finer.faces, process=False)
@@ -47,8 +48,8 @@ def settled(
 
 def _nearest(surface: trimesh.Trimesh, points: np.ndarray) -> np.ndarray:
     """The nearest points (n, 3) of the surface."""
-    o3d, scene = _scene(surface)
-    query = o3d.core.Tensor(points.astype(np.float32))
+    query = import_open3d().core.Tensor(points.astype(np.float32))
+    scene = raycasting_scene([surface], threads=1)
     found = scene.compute_closest_points(query, nthreads=1)["points"].numpy()
     return np.asarray(found, dtype=np.float64)
 
@@ -58,17 +59,7 @@ def _thickness(
 ) -> np.ndarray:
     """(n,) how far the other side of a closed mesh is from its vertices (n, 3), along unit vectors
     (n, 3)."""
-    o3d, scene = _scene(closed)
     rays = np.concatenate([vertices + past * way, way], axis=1).astype(np.float32)
-    hits = scene.cast_rays(o3d.core.Tensor(rays), nthreads=1)["t_hit"].numpy()
+    scene = raycasting_scene([closed], threads=1)
+    hits = scene.cast_rays(import_open3d().core.Tensor(rays), nthreads=1)["t_hit"].numpy()
     return np.asarray(hits, dtype=np.float64) + past
-
-
-def _scene(mesh: trimesh.Trimesh):  # type: ignore[no-untyped-def]
-    o3d = import_open3d()
-    scene = o3d.t.geometry.RaycastingScene(nthreads=1)
-    scene.add_triangles(
-        o3d.core.Tensor(np.asarray(mesh.vertices, dtype=np.float32)),
-        o3d.core.Tensor(np.asarray(mesh.faces, dtype=np.uint32)),
-    )
-    return o3d, scene

@@ -10,8 +10,10 @@ from mesh_zoo import box, moved_box, triangles
 from brrp_cli.prior.build.repair import repair
 from brrp_cli.prior.build.settle import settled
 from brrp_cli.prior.build.solids import is_solid
+from brrp_cli.prior.parameters import RepairConfig
 
 OFFSET = 0.002
+SPANNING = RepairConfig().spanning
 
 
 def around_the_box() -> trimesh.Trimesh:
@@ -22,7 +24,7 @@ def around_the_box() -> trimesh.Trimesh:
 
 
 def test_a_wrap_around_a_solid_is_the_solid() -> None:
-    found = settled(around_the_box(), box(), OFFSET, wall=0.001)
+    found = settled(around_the_box(), box(), OFFSET, wall=0.001, spanning=SPANNING)
     assert is_solid(found)
     np.testing.assert_allclose(found.extents, box().extents, atol=1e-6)
     assert found.volume == pytest.approx(box().volume, rel=1e-3)
@@ -35,14 +37,14 @@ def test_a_wrap_around_a_sheet_keeps_a_wall() -> None:
     )
     around = trimesh.creation.box(extents=[0.2 + 2 * OFFSET] * 2 + [2 * OFFSET])
     for wall in (0.001, 0.003):
-        found = settled(around.subdivide_to_size(0.01), sheet, OFFSET, wall)
+        found = settled(around.subdivide_to_size(0.01), sheet, OFFSET, wall, SPANNING)
         middle = np.abs(found.vertices[:, :2]).max(axis=1) < 0.095
         np.testing.assert_allclose(np.abs(found.vertices[middle, 2]), wall / 2, atol=1e-6)
 
 
 def test_a_wall_is_never_made_thicker() -> None:
     thin = trimesh.creation.box(extents=[0.1, 0.1, 0.001]).subdivide_to_size(0.01)
-    found = settled(thin, thin, OFFSET, wall=0.004)
+    found = settled(thin, thin, OFFSET, wall=0.004, spanning=SPANNING)
     assert found.extents[2] == pytest.approx(0.001)
     assert found.volume == pytest.approx(thin.volume)
 
@@ -52,7 +54,7 @@ def test_over_an_opening_the_wrap_sinks_by_its_offset() -> None:
     open_box = box()
     top = open_box.face_normals[:, 2] > 0.5
     open_box.update_faces(~top)
-    found = settled(around_the_box(), open_box, OFFSET, wall=0.001)
+    found = settled(around_the_box(), open_box, OFFSET, wall=0.001, spanning=SPANNING)
     middle = (np.abs(found.vertices[:, :2]) < 0.015).all(axis=1) & (found.vertices[:, 2] > 0)
     assert middle.any()
     np.testing.assert_allclose(found.vertices[middle, 2], box().bounds[1, 2], atol=1e-6)

@@ -3,24 +3,22 @@
 The depth of a plane is such that 1 / z is an affine function of the pixel, and that of a curved
 surface is one of second order, nearly. So each pixel takes the value of the quadratic function that
 fits its neighbours, over the largest of a few neighbourhoods in which one fits to within the
-sensor's noise: faces are averaged over centimetres, edges hardly.
+sensor's noise: faces are averaged over centimetres, edges hardly. (The average of neighbours that
+masks are made with, brrp_cli/segmentation/smooth_depth.py, would flatten what is curved.)
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from brrp_cli.config import SmoothConfig
+from brrp_cli.config import FittedDepthConfig
 from brrp_cli.frames.dilate import mask_box
 from brrp_cli.frames.frame import Frame
+from brrp_cli.observation.fitted_loops import surfaces_fitted
 from brrp_cli.observation.pixel_noise import PixelNoise
-from brrp_cli.observation.smooth_loops import surfaces_fitted
-
-# Of a neighbourhood: that of one pixel has five, too few to tell noise from a plane.
-LEAST_PIXELS = 2
 
 
-def smoothed(frame: Frame, object_id: int, noise: PixelNoise, config: SmoothConfig) -> Frame:
+def smoothed(frame: Frame, object_id: int, noise: PixelNoise, config: FittedDepthConfig) -> Frame:
     """The frame with the object's points moved along their rays."""
     mask = (frame.segmap == object_id) & frame.valid
     if not mask.any():
@@ -32,7 +30,7 @@ def smoothed(frame: Frame, object_id: int, noise: PixelNoise, config: SmoothConf
     wave = config.wave * noise.wave_at(depth)
     deviation = np.hypot(noise.fine[box].astype(np.float64), wave) / z**2
     pixels = [round(reach * frame.K[0, 0] / depth) for reach in config.reaches]
-    radii = np.unique(np.clip(pixels, LEAST_PIXELS, config.most_pixels)).astype(np.int64)
+    radii = np.unique(np.clip(pixels, config.least_pixels, config.most_pixels)).astype(np.int64)
     found = surfaces_fitted(1 / z, deviation, radii, config.gate, config.fit)
     points = frame.points.copy()
     points[box][own] *= (1 / (z * found))[own][:, None].astype(points.dtype)

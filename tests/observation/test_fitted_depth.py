@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 from table_scene import TABLE, ball, box, in_camera, photograph, placed
 
-from brrp_cli.config import SensorConfig, SmoothConfig
+from brrp_cli.config import FittedDepthConfig, SensorConfig
 from brrp_cli.frames.frame import Frame
+from brrp_cli.observation.fitted_depth import smoothed
 from brrp_cli.observation.pixel_noise import pixel_noise
-from brrp_cli.observation.smooth_depth import smoothed
 from brrp_cli.shapes import solids
 
 OWN, OTHER = 5, 6
-CONFIG = SmoothConfig()
+CONFIG = FittedDepthConfig()
 
 
 def noisy(frame, deviation, seed=0):

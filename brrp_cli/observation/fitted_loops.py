@@ -9,6 +9,11 @@ from brrp_cli.compiled import compiled
 
 Array = NDArray[np.float64]
 
+# Of the six coefficients' fit, and some more to tell whether it fits.
+LEAST_NEIGHBOURS = 10.0
+# Share of the neighbours' count. Below it they lie in a line, or along the mask's outline.
+LEAST_PIVOT = 0.002
+
 
 @compiled
 def surfaces_fitted(
@@ -61,7 +66,7 @@ def surfaces_fitted(
                         n += 1.0
                         square += d * d
                         noise += s * s
-                if n < 10.0:
+                if n < LEAST_NEIGHBOURS:
                     break
                 # Cholesky's decomposition: moments = root root^T.
                 solvable = True
@@ -72,10 +77,9 @@ def surfaces_fitted(
                             total -= root[i, k] * root[j, k]
                         if i > j:
                             root[i, j] = total / root[j, j]
-                        elif total > 0.002 * n:
+                        elif total > LEAST_PIVOT * n:
                             root[i, i] = np.sqrt(total)
                         else:
-                            # Neighbours in a line, or along the mask's outline.
                             solvable = False
                             break
                     if not solvable:
