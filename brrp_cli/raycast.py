@@ -23,12 +23,26 @@ RAYS = 11
 
 def raycasting_scene(meshes: Sequence[trimesh.Trimesh], threads: int = 0) -> Any:
     """An Open3D RaycastingScene in which mesh i has geometry id i. threads : 0 = all cores."""
+    return _scene_of([(mesh.vertices, mesh.faces) for mesh in meshes], threads)
+
+
+def surface_scene(
+    vertices: NDArray[np.floating], faces: NDArray[np.integer], threads: int = 1
+) -> Any:
+    """An Open3D RaycastingScene of one surface: vertices (n, 3), faces (m, 3). threads : 0 = all
+    cores."""
+    return _scene_of([(vertices, faces)], threads)
+
+
+def _scene_of(
+    surfaces: Sequence[tuple[NDArray[np.floating], NDArray[np.integer]]], threads: int
+) -> Any:
     o3d = import_open3d()
     scene = o3d.t.geometry.RaycastingScene(nthreads=threads)
-    for mesh in meshes:
+    for vertices, faces in surfaces:
         scene.add_triangles(
-            o3d.core.Tensor(np.array(mesh.vertices, dtype=np.float32)),
-            o3d.core.Tensor(np.array(mesh.faces, dtype=np.uint32)),
+            o3d.core.Tensor(np.array(vertices, dtype=np.float32)),
+            o3d.core.Tensor(np.array(faces, dtype=np.uint32)),
         )
     return scene
 

@@ -31,6 +31,7 @@ from brrp_cli.ground_truth.metrics import sample_surface
 from brrp_cli.ground_truth.scenes import find_scenes, true_mesh_in_camera
 from brrp_cli.methods.registry import METHODS
 from brrp_cli.prior.store import Prior, open_prior
+from brrp_cli.raycast import surface_scene
 from brrp_cli.reconstruction import ObjectReconstruction, Reconstruction
 from brrp_cli.seeds import child_rng
 from brrp_cli.surface.confidence import Empty, confidence_surface
@@ -147,11 +148,7 @@ def _outside(vertices: np.ndarray, faces: np.ndarray, points: np.ndarray) -> np.
     pcu = import_library("point_cloud_utils")
     o3d = import_open3d()
     center = vertices.mean(axis=0)
-    scene = o3d.t.geometry.RaycastingScene()
-    scene.add_triangles(
-        o3d.core.Tensor((vertices - center).astype(np.float32)),
-        o3d.core.Tensor(faces.astype(np.uint32)),
-    )
+    scene = surface_scene(vertices - center, faces, threads=0)
     query = o3d.core.Tensor((points - center).astype(np.float32))
     distance = scene.compute_distance(query).numpy()
     winds = pcu.triangle_soup_fast_winding_number(

@@ -23,6 +23,7 @@ from brrp_cli.grasping.scene import GraspObject
 from brrp_cli.inference.hypothesis_posterior import HypothesisPosterior
 from brrp_cli.inference.particles import particle_shares, particle_volumes
 from brrp_cli.inference.placed_shape import PlacedShape
+from brrp_cli.raycast import surface_scene
 from brrp_cli.surface.extract import grid_axes, level_set
 
 Array = NDArray[np.float64]
@@ -45,13 +46,7 @@ class Mesh:
     @cached_property
     def scene(self) -> Any:
         """It alone as Embree knows it; made once, for that takes longer than to ask it."""
-        o3d = import_open3d()
-        scene = o3d.t.geometry.RaycastingScene(nthreads=1)
-        scene.add_triangles(
-            o3d.core.Tensor(self.vertices.astype(np.float32)),
-            o3d.core.Tensor(self.faces.astype(np.uint32)),
-        )
-        return scene
+        return surface_scene(self.vertices, self.faces)
 
 
 @dataclass(frozen=True)

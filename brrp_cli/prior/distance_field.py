@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from brrp_cli.dependencies import import_open3d
 from brrp_cli.prior.parameters import FieldConfig
+from brrp_cli.raycast import surface_scene
 
 if TYPE_CHECKING:
     import trimesh
@@ -71,7 +72,7 @@ def distance_field(mesh: trimesh.Trimesh, config: FieldConfig) -> DistanceField:
     """The field of a closed mesh on about `config.nodes` nodes, which reach `config.margin` beyond
     its bounding box. The longer the box, the coarser: a flat object gets a fine grid."""
     lower, spacing, nodes = _nodes(np.asarray(mesh.bounds), config)
-    scene = _scene(mesh)
+    scene = surface_scene(mesh.vertices, mesh.faces)
     query = import_open3d().core.Tensor(nodes.reshape(-1, 3))
     distance = scene.compute_distance(query, nthreads=1).numpy()
     inside = scene.compute_occupancy(query, nthreads=1, nsamples=RAYS).numpy() > 0.5
@@ -99,7 +100,8 @@ def quick_distance_field(mesh: trimesh.Trimesh, config: FieldConfig) -> Distance
     on_surface = np.concatenate([np.asarray(mesh.vertices), corners.mean(axis=1)])
     exact[tuple(np.rint((on_surface - lower) / spacing).astype(np.int64).T)] = True
     exact = maximum_filter(exact, 2 * BAND + 1)
-    scene, query = _scene(mesh), import_open3d().core.Tensor(nodes[exact])
+    scene = surface_scene(mesh.vertices, mesh.faces)
+    query = import_open3d().core.Tensor(nodes[exact])
     closest = np.zeros_like(nodes)
     closest[exact] = scene.compute_closest_points(query, nthreads=1)["points"].numpy()
     inside = np.zeros(shape, np.bool_)
@@ -150,16 +152,6 @@ def _nodes(
     axes = [start + spacing * np.arange(n) for start, n in zip(lower, shape, strict=True)]
     nodes = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
     return lower, spacing, np.ascontiguousarray(nodes, dtype=np.float32)
-
-
-def _scene(mesh: trimesh.Trimesh) -> Any:
-    o3d = import_open3d()
-    scene = o3d.t.geometry.RaycastingScene(nthreads=1)
-    scene.add_triangles(
-        o3d.core.Tensor(np.asarray(mesh.vertices, dtype=np.float32)),
-        o3d.core.Tensor(np.asarray(mesh.faces, dtype=np.uint32)),
-    )
-    return scene
 
 
 def _as_kept(values: NDArray[np.floating]) -> NDArray[np.float32]:

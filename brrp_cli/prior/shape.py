@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from brrp_cli.dependencies import import_open3d
 from brrp_cli.prior.distance_field import DistanceField
+from brrp_cli.raycast import surface_scene
 
 # Rays that vote on which side of the surface a point lies: one that grazes an edge is outvoted.
 RAYS = 3
@@ -41,13 +42,7 @@ class StoredShape:
     @cached_property
     def scene(self) -> Any:
         """Open3D's RaycastingScene of the mesh, on one thread."""
-        o3d = import_open3d()
-        scene = o3d.t.geometry.RaycastingScene(nthreads=1)
-        scene.add_triangles(
-            o3d.core.Tensor(np.ascontiguousarray(self.vertices, dtype=np.float32)),
-            o3d.core.Tensor(np.ascontiguousarray(self.faces, dtype=np.uint32)),
-        )
-        return scene
+        return surface_scene(self.vertices, self.faces)
 
     @cached_property
     def normals(self) -> NDArray[np.float64]:

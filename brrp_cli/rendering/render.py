@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from brrp_cli.dependencies import import_open3d
 from brrp_cli.geometry import normalise, project, transform_points
+from brrp_cli.raycast import surface_scene
 from brrp_cli.reconstruction import Surface
 
 BACKGROUND = np.array([245, 245, 245], dtype=np.uint8)
@@ -63,11 +64,7 @@ def render(
     offsets = np.cumsum([0, *(len(s.vertices) for s in surfaces[:-1])])
     faces = np.concatenate([s.faces + o for s, o in zip(surfaces, offsets, strict=True)])
     palette = np.concatenate(colours)[:, :3].astype(np.float64)
-    scene = o3d.t.geometry.RaycastingScene()
-    scene.add_triangles(
-        o3d.core.Tensor(transform_points(view.T_view_cam, vertices).astype(np.float32)),
-        o3d.core.Tensor(faces.astype(np.uint32)),
-    )
+    scene = surface_scene(transform_points(view.T_view_cam, vertices), faces, threads=0)
     rays = scene.create_rays_pinhole(
         o3d.core.Tensor(view.K), o3d.core.Tensor(np.eye(4)), width, height
     )

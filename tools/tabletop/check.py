@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from brrp_cli.dependencies import import_open3d
 from brrp_cli.errors import SceneError
 from brrp_cli.ground_truth.truth import read_objects, true_mesh
+from brrp_cli.raycast import surface_scene
 
 MAX_PIXELS = 2000  # of one object; more would only take longer
 MIN_PIXELS = 16
@@ -68,7 +69,8 @@ def check_scene(
             if len(seen) < MIN_PIXELS:
                 continue
             if object_id not in surfaces:
-                surfaces[object_id] = _surface(true_mesh(objects[object_id], data_root))
+                mesh = true_mesh(objects[object_id], data_root)
+                surfaces[object_id] = surface_scene(mesh.vertices, mesh.faces, threads=0)
             distance = _distances(surfaces[object_id], seen[:: -(-len(seen) // MAX_PIXELS)])
             median, high = np.percentile(distance, [50, 95])
             distances.append(Distance(view, object_id, len(seen), float(median), float(high)))
@@ -96,16 +98,6 @@ def world_points(view: Path) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     points = world[..., :3] / world[..., 3:]
     points[depth >= 1] = np.nan
     return points, ids.astype(np.int64)
-
-
-def _surface(mesh: Any) -> Any:
-    o3d = import_open3d()
-    surface = o3d.t.geometry.RaycastingScene()
-    surface.add_triangles(
-        o3d.core.Tensor(np.asarray(mesh.vertices, dtype=np.float32)),
-        o3d.core.Tensor(np.asarray(mesh.faces, dtype=np.uint32)),
-    )
-    return surface
 
 
 def _distances(surface: Any, points: NDArray[np.float64]) -> NDArray[np.float32]:

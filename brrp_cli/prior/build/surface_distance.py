@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from brrp_cli.dependencies import import_open3d
+from brrp_cli.raycast import surface_scene
 
 if TYPE_CHECKING:
     import trimesh
@@ -35,11 +36,7 @@ def _distances(source: trimesh.Trimesh, target: trimesh.Trimesh) -> dict[str, fl
 
     o3d = import_open3d()
     center = target.bounds.mean(axis=0)
-    scene = o3d.t.geometry.RaycastingScene(nthreads=1)
-    scene.add_triangles(
-        o3d.core.Tensor(np.asarray(target.vertices - center, dtype=np.float32)),
-        o3d.core.Tensor(np.asarray(target.faces, dtype=np.uint32)),
-    )
+    scene = surface_scene(target.vertices - center, target.faces)
     points, _ = trimesh.sample.sample_surface(source, POINTS, seed=0)
     query = o3d.core.Tensor(np.asarray(points - center, dtype=np.float32))
     distance = scene.compute_distance(query, nthreads=1).numpy().astype(np.float64)
