@@ -59,13 +59,7 @@ class SeenSurface:
         own &= np.isfinite(behind)
         sure = at_pixels(points, self.sure, self.frame) == 1
         behind += np.where(sure, 0.0, self.nearer)
-        ramp = config.shell_logit / config.ramp.width * np.clip(behind, -shell, shell)
-        front = own & sure & (behind < 0)
-        told = own & (behind < shell) & np.where(front, behind > -shell, behind >= 0)
-        return Bounds(
-            np.where(told, np.maximum(ramp, -config.limit), -config.limit),
-            np.where(front, np.maximum(ramp, -config.limit), config.limit),
-        )
+        return ramp_bounds(behind, own, own & sure, shell, config)
 
 
 def seen_surface(
@@ -84,6 +78,24 @@ def seen_surface(
         with np.errstate(invalid="ignore"):
             sure &= plane.signed_distance(smooth.points) > config.rise * wave
     return SeenSurface(smooth, object_id, sure, config.nearer * wave)
+
+
+def ramp_bounds(
+    behind: Array,
+    own: NDArray[np.bool_],
+    sure: NDArray[np.bool_],
+    shell: float,
+    config: MeanConfig,
+) -> Bounds:
+    """Of points that lie `behind` (n,) metres behind what was seen, where it is the object's `own`
+    (n,); in front of it only where that is `sure` (n,). shell : as in `SeenSurface.bounds`."""
+    ramp = config.shell_logit / config.ramp.width * np.clip(behind, -shell, shell)
+    front = sure & (behind < 0)
+    told = own & (behind < shell) & np.where(front, behind > -shell, behind >= 0)
+    return Bounds(
+        np.where(told, np.maximum(ramp, -config.limit), -config.limit),
+        np.where(front, np.maximum(ramp, -config.limit), config.limit),
+    )
 
 
 def joined(bounds: Sequence[Bounds]) -> Bounds:

@@ -18,6 +18,7 @@ from brrp_cli.config.inference import (
     InferenceConfig,
     MeanConfig,
     RampConfig,
+    RevolutionConfig,
     VolumeConfig,
 )
 from brrp_cli.config.kin import KinConfig
@@ -57,6 +58,7 @@ __all__ = [
     "RayRefinementConfig",
     "RegistrationConfig",
     "RetrievalConfig",
+    "RevolutionConfig",
     "SearchConfig",
     "SensorConfig",
     "StrayConfig",

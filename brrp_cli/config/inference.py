@@ -62,6 +62,39 @@ class RampConfig:
 
 
 @dataclass(frozen=True)
+class RevolutionConfig:
+    """Objects that are round about an axis (brrp_cli/completion/revolution.py).
+
+    off : sine by which a normal leaves the planes through the axis where it has half a say in where
+        that lies; steps : in which it is fitted
+    least_points : seen, thinned; least_aside : share of them whose normals lean from the axis by a
+        sine of `aside`; least_round : share of these whose normals leave the planes through it by a
+        sine less than `meets`; least_covered : share of a turn, in `sectors`, in each of which
+        there is a share `least_sector` of them; most_scatter : metres off the mean of `neighbours`
+        after the turn, nine in ten
+    turns : for the box about all of it; cell : of a ring, in spacings of the grid; free : share of
+        a ring that is empty where all of it is
+    """
+
+    enabled: bool = True
+    off: float = 0.2
+    steps: int = 8
+    least_points: int = 150
+    aside: float = 0.5
+    least_aside: float = share(0.3)
+    meets: float = 0.3
+    least_round: float = share(0.88)
+    sectors: int = 36
+    least_sector: float = share(0.005)
+    least_covered: float = share(0.33)
+    most_scatter: float = 0.002
+    neighbours: int = 12
+    turns: int = 8
+    cell: float = 1.0
+    free: float = share(0.15)
+
+
+@dataclass(frozen=True)
 class MeanConfig:
     """Prior mean functions of hypotheses, as logits.
 
@@ -87,6 +120,7 @@ class MeanConfig:
     shell_nodes: float = 1.3
     shell_logit: float = 2.0
     ramp: RampConfig = field(default_factory=RampConfig)
+    revolution: RevolutionConfig = field(default_factory=RevolutionConfig)
     carve_depth: float = 0.006
     carve_plane: float = 0.004
     carve_behind: float = 0.01

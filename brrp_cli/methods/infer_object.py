@@ -14,6 +14,8 @@ from brrp_cli.completion.completed_mean import (
     shell_of,
     within,
 )
+from brrp_cli.completion.revolution import revolution, round_logits, turned
+from brrp_cli.completion.revolution_axis import Axis
 from brrp_cli.completion.seen_surface import SeenSurface, joined
 from brrp_cli.completion.visible_part import VisiblePart, visible_part
 from brrp_cli.config import HypothesesConfig, MeanConfig
@@ -58,7 +60,7 @@ def infer_object(
     is one more, of the completion; views : of earlier frames, none of a frame that stands alone;
     surface_cell : metres, of the grid in which samples of the seen surface are thinned
     """
-    part, guess, surface = None, None, None
+    part, guess, surface, axis = None, None, None, None
     if len(shapes) < len(weights):
         surface = seen()
         frame = surface.frame
@@ -67,15 +69,18 @@ def infer_object(
         part = visible_part(
             observation.points, frame, observation.object_id, plane, config.completion
         )
+        axis = revolution(part, config.mean.revolution)
     extents: list[Array] = [observation.points.astype(np.float64), *views.points()]
     extents += [shape.bounds for shape in shapes]
     extents += [] if part is None else [part.extent]
+    if part is not None and axis is not None:
+        extents.append(turned(axis, part.seen, config.mean.revolution.turns))
     extent = np.concatenate(extents)
     margin = config.map.margin
     box = np.stack([extent.min(axis=0) - margin, extent.max(axis=0) + margin])
     means: list[MeanFunction] = list(shapes)
     if part is not None and surface is not None:
-        completed, guess = _completed(part, surface, box, plane, config.mean, views)
+        completed, guess = _completed(part, surface, axis, box, plane, config.mean, views)
         means.append(completed)
     stiffness = np.ones(len(means))
     stiffness[: len(shapes)] = config.map.stiffness
@@ -124,6 +129,7 @@ def placed_shape(
 def _completed(
     part: VisiblePart,
     surface: SeenSurface,
+    axis: Axis | None,
     box: Array,
     plane: Plane | None,
     config: MeanConfig,
@@ -139,6 +145,8 @@ def _completed(
     bounds = [surface.bounds(left, shell, config), *views.bounds(left, shell, config)]
     every = alone.copy()
     every[~empty] = views.averaged(alone[~empty], left)
+    if axis is not None:
+        every = round_logits(axis, nodes, empty, every, part, shell, config)
     logits = within(every, empty, joined(bounds), config)
     guess = Guess(lower, spacing, np.where(empty, np.nan, alone).astype(np.float16))
     return MeanGrid(lower, spacing, logits, outside=-config.limit), guess
