@@ -29,6 +29,14 @@ class Axis:
     point: Array
     direction: Array
 
+    @property
+    def sides(self) -> Array:
+        """(2, 3) unit, across the axis and across each other."""
+        # The camera's axis that the direction leans to least.
+        other = np.eye(3)[np.argmin(np.abs(self.direction))]
+        first = normalise(np.cross(self.direction, other))
+        return np.stack([first, np.cross(self.direction, first)])
+
     def heights(self, points: Array) -> Array:
         """(n,) of points (n, 3) along the axis, metres."""
         return np.asarray((points - self.point) @ self.direction)
@@ -40,6 +48,24 @@ class Axis:
         away = from_point - (from_point @ self.direction)[:, None] * self.direction
         radius = np.linalg.norm(away, axis=1)
         return radius, away / np.maximum(radius, np.finfo(float).tiny)[:, None]
+
+    def half_plane(self, points: Array) -> Array:
+        """(n, 2) heights and radii of points (n, 3), metres: what a turn leaves as it is."""
+        return np.stack([self.heights(points), self.radii(points)[0]], axis=1)
+
+    def normals_in_half_plane(self, points: Array, normals: Array) -> Array:
+        """(n, 2) unit, of unit normals (n, 3) of points (n, 3)."""
+        _, away = self.radii(points)
+        along = np.stack([normals @ self.direction, (normals * away).sum(axis=1)], axis=1)
+        return normalise(along + np.finfo(float).tiny)
+
+    def turned(self, points: Array, turns: int) -> Array:
+        """Points (n, 3) at so many turns about the axis, (turns * n, 3)."""
+        height, radius = self.half_plane(points).T
+        angle = np.arange(turns) * (2 * np.pi / turns)
+        around = np.stack([np.cos(angle), np.sin(angle)], axis=1) @ self.sides
+        on_axis = self.point + height[:, None] * self.direction
+        return np.asarray((on_axis + radius[:, None] * around[:, None]).reshape(-1, 3))
 
     def turned_off(self, points: Array, normals: Array) -> Array:
         """(n,) sines by which unit normals (n, 3) of points (n, 3) leave the planes through the

@@ -67,11 +67,16 @@ class RevolutionConfig:
 
     off : sine by which a normal leaves the planes through the axis where it has half a say in where
         that lies; steps : in which it is fitted
-    least_points : seen, thinned; least_aside : share of them whose normals lean from the axis by a
-        sine of `aside`; least_round : share of these whose normals leave the planes through it by a
-        sine less than `meets`; least_covered : share of a turn, in `sectors`, in each of which
-        there is a share `least_sector` of them; most_scatter : metres off the mean of `neighbours`
-        after the turn, nine in ten
+    least_points : seen, thinned; most_points : more are thinned further
+    least_aside : share of them whose normals lean from the axis by a sine of `aside`; least_round :
+        share of these whose normals leave the planes through it by a sine less than `meets`;
+        least_covered : share of a turn, in `sectors`, in each of which there is a share
+        `least_sector` of them
+    most_scatter : metres within which nine in ten points lie of the `neighbours` that the turn
+        brings beside them; `leaning` times as many count for an axis that leans
+    beside : metres from a seen point along the surface to where it tells where that lies
+    patch : metres, of the half plane, in which points are one-sided if their mean direction from
+        the axis is longer than `one_sided`
     turns : for the box about all of it; cell : of a ring, in spacings of the grid; free : share of
         a ring that is empty where all of it is
     """
@@ -80,6 +85,7 @@ class RevolutionConfig:
     off: float = 0.2
     steps: int = 8
     least_points: int = 150
+    most_points: int = 4000
     aside: float = 0.5
     least_aside: float = share(0.3)
     meets: float = 0.3
@@ -88,7 +94,11 @@ class RevolutionConfig:
     least_sector: float = share(0.005)
     least_covered: float = share(0.33)
     most_scatter: float = 0.002
+    leaning: float = 1.1
     neighbours: int = 12
+    beside: float = 0.003
+    patch: float = 0.005
+    one_sided: float = share(0.97)
     turns: int = 8
     cell: float = 1.0
     free: float = share(0.15)

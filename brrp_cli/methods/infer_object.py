@@ -14,8 +14,9 @@ from brrp_cli.completion.completed_mean import (
     shell_of,
     within,
 )
-from brrp_cli.completion.revolution import revolution, round_logits, turned
+from brrp_cli.completion.revolution import round_logits
 from brrp_cli.completion.revolution_axis import Axis
+from brrp_cli.completion.roundness import axis_of
 from brrp_cli.completion.seen_surface import SeenSurface, joined
 from brrp_cli.completion.visible_part import VisiblePart, visible_part
 from brrp_cli.config import HypothesesConfig, MeanConfig
@@ -69,12 +70,12 @@ def infer_object(
         part = visible_part(
             observation.points, frame, observation.object_id, plane, config.completion
         )
-        axis = revolution(part, config.mean.revolution)
+        axis = axis_of(part.seen, part.normals, part.up, config.mean.revolution)
     extents: list[Array] = [observation.points.astype(np.float64), *views.points()]
     extents += [shape.bounds for shape in shapes]
     extents += [] if part is None else [part.extent]
     if part is not None and axis is not None:
-        extents.append(turned(axis, part.seen, config.mean.revolution.turns))
+        extents.append(axis.turned(part.seen, config.mean.revolution.turns))
     extent = np.concatenate(extents)
     margin = config.map.margin
     box = np.stack([extent.min(axis=0) - margin, extent.max(axis=0) + margin])

@@ -1,0 +1,72 @@
+"""What is taken for round about an axis, and what is not."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from brrp_cli.completion.revolution_axis import Axis
+from brrp_cli.completion.roundness import axis_of, roundness_about
+from brrp_cli.config import RevolutionConfig
+from tests.support.turned_shapes import frustum, turned_and_moved, two_faces
+
+CONFIG = RevolutionConfig()
+UP = np.array([0.0, 0.0, 1.0])
+
+
+def test_a_can_is_round_about_its_axis_and_not_about_one_beside_it():
+    points, normals = frustum(0.04, 0.04, 0.1)
+    about = roundness_about(Axis(np.zeros(3), UP), points, normals, CONFIG)
+    assert about.aside == about.round == 1
+    assert about.covered == pytest.approx(0.5, abs=0.06)
+    assert about.scatter < 1e-4
+    beside = roundness_about(Axis(np.array([0.0, 0.02, 0.0]), UP), points, normals, CONFIG)
+    assert beside.round < about.round and beside.scatter > 10 * about.scatter
+
+
+@pytest.mark.parametrize("shape", [(0.04, 0.04, 0.1), (0.02, 0.05, 0.12), (0.01, 0.12, 0.06)])
+def test_round_things_have_an_axis_wherever_they_point(shape):
+    points, normals = frustum(*shape, count=3000, noise=0.05)
+    standing = axis_of(points, normals, UP, CONFIG)
+    assert standing is not None and abs(standing.direction @ UP) > 0.999
+    points, normals, T = turned_and_moved(points, normals)
+    lying = axis_of(points, normals, UP, CONFIG)
+    assert lying is not None and abs(lying.direction @ T[:3, 2]) > 0.999
+
+
+@pytest.mark.parametrize("width", [0.03, 0.06, 0.2])
+def test_a_box_has_none(width):
+    assert axis_of(*two_faces(width, 0.1), UP, CONFIG) is None
+
+
+def test_one_face_has_none():
+    """It may be part of something round that is very large."""
+    points, normals = two_faces(0.1, 0.1)
+    face = normals[:, 0] > 0.5
+    assert axis_of(points[face], normals[face], UP, CONFIG) is None
+
+
+def test_too_little_of_a_can_has_none():
+    points, normals = frustum(0.04, 0.04, 0.1, seen=np.radians(60))
+    assert axis_of(points, normals, UP, CONFIG) is None
+    few = CONFIG.least_points - 1
+    points, normals = frustum(0.04, 0.04, 0.1, count=few)
+    assert axis_of(points, normals, UP, CONFIG) is None
+
+
+def test_it_can_be_switched_off():
+    can = frustum(0.04, 0.04, 0.1)
+    assert axis_of(*can, UP, CONFIG) is not None
+    assert axis_of(*can, UP, replace(CONFIG, enabled=False)) is None
+
+
+def test_an_upright_axis_is_taken_where_it_is_as_good():
+    """A ball is round about every axis."""
+    rng = np.random.default_rng(0)
+    normals = rng.normal(size=(2000, 3))
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    normals = normals[normals @ [1, 0, 1] > 0]
+    found = axis_of(0.04 * normals, normals, UP, CONFIG)
+    assert found is not None and abs(found.direction @ UP) > 0.999
