@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import map_coordinates
+from scipy.ndimage import map_coordinates, uniform_filter
 from scipy.spatial import cKDTree
 
 from brrp_cli.completion.revolution_axis import Axis
@@ -23,7 +23,7 @@ from brrp_cli.completion.roundness import sides
 from brrp_cli.completion.seen_surface import Bounds, joined, ramp_bounds
 from brrp_cli.completion.visible_part import VisiblePart
 from brrp_cli.config import MeanConfig, RevolutionConfig
-from brrp_cli.geometry import cells_of, normalise
+from brrp_cli.geometry import normalise
 
 Array = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -48,11 +48,15 @@ def round_logits(
     cell = own.cell * float(np.linalg.norm(nodes[1, 0, 0] - nodes[0, 0, 0]))
     flat = axis.half_plane(nodes.reshape(-1, 3))
     rings = _Rings(float(flat[:, 0].min()), cell, flat)
-    free = rings.mean(empty.ravel().astype(np.float64)) > own.free
     left = ~empty.ravel()
+    # Under the plane there is nothing, however the ring goes on above it.
+    above = np.ones(len(left), bool)
+    if part.plane is not None:
+        above = part.plane.signed_distance(nodes.reshape(-1, 3)) > 0
+    free = rings.mean(empty.ravel()[above].astype(np.float64), above) > own.free
     thought = np.clip(guess.ravel()[left], -limit, limit)
     logits = np.where(free, -limit, rings.mean(thought, left))
-    out = _stands_out(axis, part.seen, part.normals, config.revolution)
+    out = _stands_out(axis, part.seen, own)
     bounds = _seen_bounds(axis, flat[left], part.seen[~out], part.normals[~out], shell, config)
     turned = bounds.applied(rings.at(flat[left], logits))
     more = np.flatnonzero(thought > turned)
@@ -65,17 +69,23 @@ def round_logits(
     return found
 
 
-def _stands_out(axis: Axis, points: Array, normals: Array, config: RevolutionConfig) -> Bools:
-    """Which of seen points (n, 3) with unit normals (n, 3) have others beside them, once they are
-    turned, from nearly the same side alone: those of a handle, of which a turn tells nothing."""
-    flat, across = axis.half_plane(points), axis.normals_in_half_plane(points, normals)
+def _stands_out(axis: Axis, points: Array, config: RevolutionConfig) -> Bools:
+    """Which of seen points (n, 3) have others about them, once they are turned, from nearly the
+    same side alone: those of a handle, of which a turn tells nothing."""
+    flat = axis.half_plane(points)
+    index = np.floor((flat - flat.min(axis=0)) / config.patch).astype(np.int64)
+    shape = tuple(index.max(axis=0) + 1)
+    ring = np.ravel_multi_index(tuple(index.T), shape)
     away = axis.radii(points)[1] @ axis.sides.T
-    facing = np.where(sides(across)[0], 1.0, 0.0)
-    cell = cells_of(np.column_stack([flat / config.patch, facing]), 1.0)
-    count = np.bincount(cell)
+    about = [
+        uniform_filter(
+            np.bincount(ring, each, int(np.prod(shape))).reshape(shape), 3, mode="constant"
+        )
+        for each in (np.ones(len(points)), *away.T)
+    ]
+    count, *direction = (each.ravel()[ring] for each in about)
     # The length of the mean direction: 1 where all are the same.
-    mean = [np.bincount(cell, each) / count for each in away.T]
-    return np.asarray(np.hypot(*mean)[cell] > config.one_sided)
+    return np.asarray(np.hypot(*direction) > config.one_sided * count)
 
 
 @dataclass(frozen=True)

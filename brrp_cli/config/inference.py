@@ -75,8 +75,8 @@ class RevolutionConfig:
     most_scatter : metres within which nine in ten points lie of the `neighbours` that the turn
         brings beside them; `leaning` times as many count for an axis that leans
     beside : metres from a seen point along the surface to where it tells where that lies
-    patch : metres, of the half plane, in which points are one-sided if their mean direction from
-        the axis is longer than `one_sided`
+    patch : metres, of the half plane; points are one-sided if the mean direction from the axis, of
+        those in three patches by three, is longer than `one_sided`
     turns : for the box about all of it; cell : of a ring, in spacings of the grid; free : share of
         a ring that is empty where all of it is
     """
@@ -97,7 +97,7 @@ class RevolutionConfig:
     leaning: float = 1.1
     neighbours: int = 12
     beside: float = 0.003
-    patch: float = 0.005
+    patch: float = 0.004
     one_sided: float = share(0.97)
     turns: int = 8
     cell: float = 1.0

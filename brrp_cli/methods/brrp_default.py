@@ -9,12 +9,12 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from brrp_cli.completion.seen_surface import SeenSurface, seen_surface
+from brrp_cli.completion.seen_surface import seen_surface
 from brrp_cli.config import FittedMapConfig, HypothesesConfig
 from brrp_cli.config.registration import TrialConfig
 from brrp_cli.methods.earlier_views import ALONE, EarlierViews, remember
-from brrp_cli.methods.infer_object import infer_object, placed_shape
-from brrp_cli.methods.kin_hypotheses import KinHypothesis, kin_hypotheses
+from brrp_cli.methods.infer_object import Shown, infer_object, placed_shape, shown_of
+from brrp_cli.methods.kin_hypotheses import KinHypothesis, beside_round, kin_hypotheses
 from brrp_cli.methods.scene import Scene
 from brrp_cli.observation.ray_samples import ObjectObservation
 from brrp_cli.reconstruction import OK, ObjectReconstruction, Retrieved, Similar
@@ -177,10 +177,14 @@ def reconstruct_by_hypotheses(
             )
 
     @cache
-    def surface() -> SeenSurface:
-        return seen_surface(frame, object_id, plane, noise, hypotheses.mean.ramp)
+    def shown() -> Shown:
+        surface = seen_surface(frame, object_id, plane, noise, hypotheses.mean.ramp)
+        cell = config.observation.surface_cell
+        return shown_of(surface, observation, plane, cell, hypotheses)
 
     with timed(seconds, "inference"):
+        if like and shown().axis is not None:
+            like = beside_round(like, hypotheses.kin)
         shared = _shared_with_kin(weights, like)
         kept = _kept(shared, hypotheses.map)
         alike: dict[int, Array] = {}
@@ -207,13 +211,12 @@ def reconstruct_by_hypotheses(
             observation,
             frame,
             plane,
-            surface,
+            shown,
             wave,
             shapes,
             shared[kept] / shared[kept].sum(),
             hypotheses,
             views,
-            surface_cell=config.observation.surface_cell,
             seed=seed,
             device=device,
         )
@@ -230,7 +233,7 @@ def reconstruct_by_hypotheses(
             [(each, float(weight)) for each, weight in zip(placed, weights, strict=False)],
             best_ratios(placed, alone),
             guess,
-            surface(),
+            shown().surface,
             not views,
             views.config.samples,
             child_rng(seed, "remembered", object_id),

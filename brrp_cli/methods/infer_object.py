@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,50 +38,69 @@ from brrp_cli.seeds import child_seed
 Array = NDArray[np.float64]
 
 
+@dataclass(frozen=True)
+class Shown:
+    """What the frame shows of an object for its completion. observation : with the points of the
+    smoothed surface; axis : about which it is round, None if it is not"""
+
+    surface: SeenSurface
+    observation: ObjectObservation
+    part: VisiblePart
+    axis: Axis | None
+
+
+def shown_of(
+    surface: SeenSurface,
+    observation: ObjectObservation,
+    plane: Plane | None,
+    surface_cell: float,
+    config: HypothesesConfig,
+) -> Shown:
+    """surface_cell : metres, of the grid in which samples of the seen surface are thinned"""
+    frame, object_id = surface.frame, observation.object_id
+    observation = observation.with_points(frame.object_points(object_id), surface_cell)
+    part = visible_part(observation.points, frame, object_id, plane, config.completion)
+    axis = axis_of(part.seen, part.normals, part.up, config.mean.revolution)
+    return Shown(surface, observation, part, axis)
+
+
 def infer_object(
     observation: ObjectObservation,
     frame: Frame,
     plane: Plane | None,
-    seen: Callable[[], SeenSurface],
+    shown: Callable[[], Shown],
     wave: float,
     shapes: list[PlacedShape],
     weights: Array,
     config: HypothesesConfig,
     views: EarlierViews,
     *,
-    surface_cell: float,
     seed: int,
     device: str,
 ) -> tuple[HypothesisPosterior, Guess | None]:
     """The posterior, camera frame, and what the completion's network thinks of this view alone;
     None where the completion weighs nothing.
 
-    seen : the object's surface in the frame, which the completion needs
+    shown : which the completion needs
     wave : metres, as in `reconstruct_by_hypotheses`; weights : (C,) of the shapes and, where there
-    is one more, of the completion; views : of earlier frames, none of a frame that stands alone;
-    surface_cell : metres, of the grid in which samples of the seen surface are thinned
+    is one more, of the completion; views : of earlier frames, none of a frame that stands alone
     """
-    part, guess, surface, axis = None, None, None, None
-    if len(shapes) < len(weights):
-        surface = seen()
-        frame = surface.frame
-        points = frame.object_points(observation.object_id)
-        observation = observation.with_points(points, surface_cell)
-        part = visible_part(
-            observation.points, frame, observation.object_id, plane, config.completion
-        )
-        axis = axis_of(part.seen, part.normals, part.up, config.mean.revolution)
+    own = shown() if len(shapes) < len(weights) else None
+    if own is not None:
+        frame, observation = own.surface.frame, own.observation
     extents: list[Array] = [observation.points.astype(np.float64), *views.points()]
     extents += [shape.bounds for shape in shapes]
-    extents += [] if part is None else [part.extent]
-    if part is not None and axis is not None:
-        extents.append(axis.turned(part.seen, config.mean.revolution.turns))
+    if own is not None:
+        extents.append(own.part.extent)
+        if own.axis is not None:
+            extents.append(own.axis.turned(own.part.seen, config.mean.revolution.turns))
     extent = np.concatenate(extents)
     margin = config.map.margin
     box = np.stack([extent.min(axis=0) - margin, extent.max(axis=0) + margin])
     means: list[MeanFunction] = list(shapes)
-    if part is not None and surface is not None:
-        completed, guess = _completed(part, surface, axis, box, plane, config.mean, views)
+    guess = None
+    if own is not None:
+        completed, guess = _completed(own, box, plane, config.mean, views)
         means.append(completed)
     stiffness = np.ones(len(means))
     stiffness[: len(shapes)] = config.map.stiffness
@@ -128,22 +147,21 @@ def placed_shape(
 
 
 def _completed(
-    part: VisiblePart,
-    surface: SeenSurface,
-    axis: Axis | None,
+    shown: Shown,
     box: Array,
     plane: Plane | None,
     config: MeanConfig,
     views: EarlierViews,
 ) -> tuple[MeanGrid, Guess]:
     """From all views, and what the network thinks of the present one."""
+    part, axis = shown.part, shown.axis
     lower, spacing, nodes = grid_over(box, config.nodes)
     points = nodes.reshape(-1, 3)
     empty = empty_space(points, part.frame, part.object_id, plane, config)
     empty = (empty | views.empty(points, config)).reshape(nodes.shape[:3])
     alone = network_grid(nodes, empty, part, config)
     shell, left = shell_of(nodes, config), nodes[~empty]
-    bounds = [surface.bounds(left, shell, config), *views.bounds(left, shell, config)]
+    bounds = [shown.surface.bounds(left, shell, config), *views.bounds(left, shell, config)]
     every = alone.copy()
     every[~empty] = views.averaged(alone[~empty], left)
     if axis is not None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,11 +30,13 @@ Array = NDArray[np.float64]
 @dataclass(frozen=True)
 class KinHypothesis:
     """share : of the weight of "none of the stored objects"; scales : (3,) over the stored shape,
-    along the axes of its box in its resting pose, the last upright."""
+    along the axes of its box in its resting pose, the last upright; walls : from 0, a solid, to 1,
+    a hollow thing."""
 
     shape: PlacedShape
     share: float
     scales: tuple[float, float, float]
+    walls: float
 
 
 def kin_hypotheses(
@@ -91,6 +93,13 @@ def kin_hypotheses(
         )
         if share >= kin.least_share
     ]
+
+
+def beside_round(like: Sequence[KinHypothesis], config: KinConfig) -> list[KinHypothesis]:
+    """What is left of kin where the completion knows that the object is round: it is better than
+    all that is solid then, and lacks walls that were not seen."""
+    left = [replace(each, share=each.share * each.walls) for each in like]
+    return [each for each in left if each.share >= config.least_share]
 
 
 def kin_shares(
@@ -188,4 +197,4 @@ def _hypothesis(
         exact=kin.exact if walls > 0 else 0.0,
     )
     x, y, z = (float(s) for s in bent.fit.half / bent.fit.stored_half)
-    return KinHypothesis(placed, share, (x, y, z))
+    return KinHypothesis(placed, share, (x, y, z), walls)
