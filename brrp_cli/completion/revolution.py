@@ -56,7 +56,8 @@ def round_logits(
     free = rings.mean(empty.ravel()[above].astype(np.float64), above) > own.free
     thought = np.clip(guess.ravel()[left], -limit, limit)
     logits = np.where(free, -limit, rings.mean(thought, left))
-    out = _stands_out(axis, part.seen, own)
+    ring = rings.at(axis.half_plane(part.seen), free.astype(np.float64))
+    out = (ring > 0.5) & _one_sided(axis, part.seen, own)
     bounds = _seen_bounds(axis, flat[left], part.seen[~out], part.normals[~out], shell, config)
     turned = bounds.applied(rings.at(flat[left], logits))
     more = np.flatnonzero(thought > turned)
@@ -69,7 +70,7 @@ def round_logits(
     return found
 
 
-def _stands_out(axis: Axis, points: Array, config: RevolutionConfig) -> Bools:
+def _one_sided(axis: Axis, points: Array, config: RevolutionConfig) -> Bools:
     """Which of seen points (n, 3) have others about them, once they are turned, from nearly the
     same side alone: those of a handle, of which a turn tells nothing."""
     flat = axis.half_plane(points)

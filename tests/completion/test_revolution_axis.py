@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from turned_shapes import frustum, turned_and_moved
 
 from brrp_cli.completion.revolution_axis import Axis, free_axis, upright_axis
-from tests.support.turned_shapes import frustum, turned_and_moved
 
 UP = np.array([0.0, 0.0, 1.0])
 SHAPES = {"can": (0.04, 0.04, 0.1), "cup": (0.03, 0.05, 0.1), "cone": (0.005, 0.06, 0.05)}

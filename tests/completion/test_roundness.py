@@ -6,11 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from turned_shapes import frustum, turned_and_moved, two_faces
 
 from brrp_cli.completion.revolution_axis import Axis
 from brrp_cli.completion.roundness import axis_of, roundness_about
 from brrp_cli.config import RevolutionConfig
-from tests.support.turned_shapes import frustum, turned_and_moved, two_faces
 
 CONFIG = RevolutionConfig()
 UP = np.array([0.0, 0.0, 1.0])
