@@ -23,13 +23,15 @@ class Roundness:
 
     aside : share of the points whose normals lean away from the axis enough to tell; round : share
     of these whose normals meet it; covered : share of a turn over which these are spread; scatter :
-    metres within which nine in ten points lie of those that the turn brings beside them
+    metres within which nine in ten points lie of those that the turn brings beside them; oval : by
+    which share of its radius it is wider one way than across
     """
 
     aside: float
     round: float
     covered: float
     scatter: float
+    oval: float
 
     def enough(self, config: RevolutionConfig) -> bool:
         """Whether they are."""
@@ -38,6 +40,7 @@ class Roundness:
             and self.round >= config.least_round
             and self.covered >= config.least_covered
             and self.scatter <= config.most_scatter
+            and self.oval <= config.most_oval
         )
 
 
@@ -74,6 +77,7 @@ def roundness_about(
         round=float(meets[leans].mean()) if leans.any() else 0.0,
         covered=float((count >= max(2.0, config.least_sector * len(told))).mean()),
         scatter=float(np.quantile(_scatter(axis, points, normals, config.neighbours), MOST)),
+        oval=_oval(axis, points[meets], normals[meets], config),
     )
 
 
@@ -82,6 +86,34 @@ def sides(across: Array) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
     sides of a wall are beside one another."""
     outer = across[:, 1] >= 0
     return outer, ~outer
+
+
+def _oval(axis: Axis, points: Array, normals: Array, config: RevolutionConfig) -> float:
+    """The axis of something oval is in its middle, and every normal nearly meets it. But its radius
+    changes twice as fast as the turn: r (1 + e cos 2 (turn - first)) is wider by 2 e one way."""
+    outer = axis.normals_in_half_plane(points, normals)[:, 1] > config.aside
+    if outer.sum() < config.neighbours:
+        return 0.0
+    height, radius = axis.half_plane(points[outer]).T
+    turn = np.arctan2(*(axis.radii(points[outer])[1] @ axis.sides.T).T)
+    low, high = height.min(), height.max()
+    level = np.rint((height - low) / max(high - low, 1e-9) * (config.levels - 1)).astype(np.int64)
+    count = np.bincount(level)
+
+    def beside_mean(values: Array) -> Array:
+        return values - (np.bincount(level, values) / np.maximum(count, 1))[level]
+
+    relative = beside_mean(radius) / np.maximum(radius - beside_mean(radius), 1e-9)
+    # An axis that is not quite in the middle shows once in a turn.
+    waves = [wave(k * turn) for k in (1, 2) for wave in (np.cos, np.sin)]
+    A = np.stack([beside_mean(each) for each in waves], axis=1)
+    weight, found = np.ones(len(A)), np.zeros(4)
+    for _ in range(config.steps):
+        weighed = A * weight[:, None]
+        # Waves that what is seen of a turn does not tell apart count as none.
+        found = np.linalg.solve(weighed.T @ A + 1e-5 * len(A) * np.eye(4), weighed.T @ relative)
+        weight = 1 / (1 + ((relative - A @ found) / config.strays) ** 2)
+    return 2 * float(np.hypot(*found[2:]))
 
 
 def _scatter(axis: Axis, points: Array, normals: Array, neighbours: int) -> Array:

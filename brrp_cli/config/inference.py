@@ -74,6 +74,8 @@ class RevolutionConfig:
         `least_sector` of them
     most_scatter : metres within which nine in ten points lie of the `neighbours` that the turn
         brings beside them; `leaning` times as many count for an axis that leans
+    most_oval : share of the radius by which it may be wider one way than across, over `levels` of
+        the height; radii that are off by a share `strays` lose half of their say
     beside : metres from a seen point along the surface to where it tells where that lies
     patch : metres, of the half plane; points are one-sided if the mean direction from the axis, of
         those in three patches by three, is longer than `one_sided`
@@ -95,6 +97,9 @@ class RevolutionConfig:
     least_covered: float = share(0.33)
     most_scatter: float = 0.002
     leaning: float = 1.1
+    most_oval: float = share(0.2)
+    levels: int = 24
+    strays: float = share(0.05)
     neighbours: int = 12
     beside: float = 0.003
     patch: float = 0.004

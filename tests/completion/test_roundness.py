@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from turned_shapes import frustum, turned_and_moved, two_faces
 
-from brrp_cli.completion.revolution_axis import Axis
+from brrp_cli.completion.revolution_axis import Axis, upright_axis
 from brrp_cli.completion.roundness import axis_of, roundness_about
 from brrp_cli.config import RevolutionConfig
 
@@ -70,3 +70,23 @@ def test_an_upright_axis_is_taken_where_it_is_as_good():
     normals = normals[normals @ [1, 0, 1] > 0]
     found = axis_of(0.04 * normals, normals, UP, CONFIG)
     assert found is not None and abs(found.direction @ UP) > 0.999
+
+
+@pytest.mark.parametrize("axis", [0, 1])
+def test_an_oval_bottle_is_told_from_a_round_one(axis):
+    """Seen from its narrow and from its broad side."""
+    found = {}
+    for squeezed in (1.0, 0.9, 0.75, 0.6):
+        scale = np.ones(3)
+        scale[axis] = squeezed
+        points, normals = frustum(0.04, 0.05, 0.15, count=2000)
+        points, normals = points * scale, normals / scale
+        normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+        upright = upright_axis(points, normals, UP, CONFIG.off, CONFIG.steps)
+        found[squeezed] = roundness_about(upright, points, normals, CONFIG).oval
+        has_axis = axis_of(points, normals, UP, CONFIG) is not None
+        assert has_axis == (squeezed >= 0.9), squeezed
+    assert found[1.0] == pytest.approx(0, abs=0.02)
+    # (1 - 0.9) / 0.95, and (1 - 0.75) / 0.875
+    assert found[0.9] == pytest.approx(0.105, abs=0.03)
+    assert found[0.75] == pytest.approx(0.286, abs=0.09)
