@@ -19,11 +19,10 @@ from scipy.ndimage import map_coordinates, uniform_filter
 from scipy.spatial import cKDTree
 
 from brrp_cli.completion.revolution_axis import Axis
-from brrp_cli.completion.roundness import sides
+from brrp_cli.completion.roundness import mean_normals, sides
 from brrp_cli.completion.seen_surface import Bounds, joined, ramp_bounds
 from brrp_cli.completion.visible_part import VisiblePart
 from brrp_cli.config import MeanConfig, RevolutionConfig
-from brrp_cli.geometry import normalise
 
 Array = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -132,7 +131,7 @@ def _seen_bounds(
         distance, rows = tree.query(asked, k=own.neighbours, distance_upper_bound=reach)
         near = np.isfinite(distance).all(axis=1)
         rows = rows[near]
-        normal = normalise(across[side][rows].mean(axis=1) + np.finfo(float).tiny)
+        normal = mean_normals(across[side], rows)
         behind = ((flat[side][rows].mean(axis=1) - asked[near]) * normal).sum(axis=1)
         beside = np.sqrt(np.maximum(distance[near, 0] ** 2 - behind**2, 0))
         told = beside < own.beside

@@ -18,7 +18,8 @@ from brrp_cli.geometry import normalise
 
 Array = NDArray[np.float64]
 
-# Of the problem's largest eigenvalue: what is less says nothing of where the axis lies.
+# Share of a matrix's trace that keeps it from being singular; the square root of it is the least
+# share of its largest eigenvalue that counts as one.
 LEAST = 1e-6
 
 
@@ -76,7 +77,7 @@ class Axis:
 
 def upright_axis(points: Array, normals: Array, up: Array, off: float, steps: int) -> Axis:
     """The axis along `up` (3,) of points (n, 3) with unit normals (n, 3); one that is off by a sine
-    of `off` has half a say after each of `steps` steps."""
+    of `off` has a quarter of its say in the next of `steps` steps."""
     side = np.cross(normals, up)
     # n . (up x (p - c)) = 0, and n . (up x p) = (n x up) . p.
     asked = (side * points).sum(axis=1)

@@ -13,8 +13,6 @@ from brrp_cli.config import RevolutionConfig
 from brrp_cli.geometry import normalise
 
 Array = NDArray[np.float64]
-# Of the points, within which `scatter` is told.
-MOST = 0.9
 
 
 @dataclass(frozen=True)
@@ -23,7 +21,8 @@ class Roundness:
 
     aside : share of the points whose normals lean away from the axis enough to tell; round : share
     of these whose normals meet it; covered : share of a turn over which these are spread; scatter :
-    metres within which nine in ten points lie of those that the turn brings beside them; oval : by
+    metres within which a share `within` of the points lies of those that the turn brings beside
+    them; oval : by
     which share of its radius it is wider one way than across
     """
 
@@ -76,7 +75,9 @@ def roundness_about(
         aside=float(leans.mean()),
         round=float(meets[leans].mean()) if leans.any() else 0.0,
         covered=float((count >= max(2.0, config.least_sector * len(told))).mean()),
-        scatter=float(np.quantile(_scatter(axis, points, normals, config.neighbours), MOST)),
+        scatter=float(
+            np.quantile(_scatter(axis, points, normals, config.neighbours), config.within)
+        ),
         oval=_oval(axis, points[meets], normals[meets], config),
     )
 
@@ -86,6 +87,11 @@ def sides(across: Array) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
     sides of a wall are beside one another."""
     outer = across[:, 1] >= 0
     return outer, ~outer
+
+
+def mean_normals(across: Array, rows: NDArray[np.int64]) -> Array:
+    """Unit normals (m, 2) of neighbours with normals (n, 2), their rows (m, k)."""
+    return normalise(across[rows].mean(axis=1) + np.finfo(float).tiny)
 
 
 def _oval(axis: Axis, points: Array, normals: Array, config: RevolutionConfig) -> float:
@@ -125,7 +131,7 @@ def _scatter(axis: Axis, points: Array, normals: Array, neighbours: int) -> Arra
         if count < 2:
             continue
         _, rows = cKDTree(flat[side]).query(flat[side], k=count)
-        normal = normalise(across[side][rows].mean(axis=1) + np.finfo(float).tiny)
+        normal = mean_normals(across[side], rows)
         off = ((flat[side][:, None] - flat[side][rows]) * normal[:, None]).sum(axis=-1)
         found[side] = np.sqrt(np.square(off).mean(axis=1))
     return found

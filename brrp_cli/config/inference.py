@@ -65,15 +65,15 @@ class RampConfig:
 class RevolutionConfig:
     """Objects that are round about an axis (brrp_cli/completion/revolution.py).
 
-    off : sine by which a normal leaves the planes through the axis where it has half a say in where
-        that lies; steps : in which it is fitted
+    off : sine by which a normal leaves the planes through the axis where it has a quarter of its
+        say in where that lies; steps : in which it is fitted
     least_points : seen, thinned; most_points : more are thinned further
     least_aside : share of them whose normals lean from the axis by a sine of `aside`; least_round :
         share of these whose normals leave the planes through it by a sine less than `meets`;
         least_covered : share of a turn, in `sectors`, in each of which there is a share
         `least_sector` of them
-    most_scatter : metres within which nine in ten points lie of the `neighbours` that the turn
-        brings beside them; `leaning` times as many count for an axis that leans
+    most_scatter : metres within which a share `within` of the points lies of the `neighbours` that
+        the turn brings beside them; `leaning` times as many count for an axis that leans
     most_oval : share of the radius by which it may be wider one way than across, over `levels` of
         the height; radii that are off by a share `strays` lose half of their say
     beside : metres from a seen point along the surface to where it tells where that lies
@@ -96,6 +96,7 @@ class RevolutionConfig:
     least_sector: float = share(0.005)
     least_covered: float = share(0.33)
     most_scatter: float = 0.002
+    within: float = share(0.9)
     leaning: float = 1.1
     most_oval: float = share(0.2)
     levels: int = 24
