@@ -29,18 +29,53 @@ def _cell(at: float, count: int) -> tuple[int, float, float]:
 
 
 @compiled
+def _corners(
+    values: Floats, shape: tuple[int, int, int], i: int, j: int, k: int
+) -> tuple[float, float, float, float, float, float, float, float]:
+    """Distances at the corners of a cell, the last axis first; values : of all nodes in a row."""
+    # Numbers without a sign need no check whether they count from the end.
+    first = np.uintp((i * shape[1] + j) * shape[2] + k)
+    one, row, layer = np.uintp(1), np.uintp(shape[2]), np.uintp(shape[1] * shape[2])
+    second, third, fourth = first + row, first + layer, first + layer + row
+    return (
+        float(values[first]),
+        float(values[first + one]),
+        float(values[second]),
+        float(values[second + one]),
+        float(values[third]),
+        float(values[third + one]),
+        float(values[fourth]),
+        float(values[fourth + one]),
+    )
+
+
+@compiled
+def _distance(
+    values: Floats, shape: tuple[int, int, int], spacing: float, x: float, y: float, z: float
+) -> float:
+    """At a point in nodes; values : of all nodes in a row."""
+    i, x, off_x = _cell(x, shape[0])
+    j, y, off_y = _cell(y, shape[1])
+    k, z, off_z = _cell(z, shape[2])
+    a, a1, b, b1, c, c1, d, d1 = _corners(values, shape, i, j, k)
+    a, b, c, d = a + z * (a1 - a), b + z * (b1 - b), c + z * (c1 - c), d + z * (d1 - d)
+    near, far = a + y * (b - a), c + y * (d - c)
+    off = off_x * off_x + off_y * off_y + off_z * off_z
+    value = near + x * (far - near)
+    return value + math.sqrt(off) * spacing if off > 0 else value
+
+
+@compiled
 def _look_up(
-    values: Floats, lower: Array, spacing: float, px: float, py: float, pz: float
+    values: Floats, shape: tuple[int, int, int], spacing: float, x: float, y: float, z: float
 ) -> tuple[float, float, float, float]:
-    """Distance and gradient at one point."""
+    """Distance and gradient at a point in nodes; values : of all nodes in a row."""
     nodes = 1 / spacing
-    i, x, off_x = _cell((px - lower[0]) * nodes, values.shape[0])
-    j, y, off_y = _cell((py - lower[1]) * nodes, values.shape[1])
-    k, z, off_z = _cell((pz - lower[2]) * nodes, values.shape[2])
-    a, b = float(values[i, j, k]), float(values[i, j + 1, k])
-    c, d = float(values[i + 1, j, k]), float(values[i + 1, j + 1, k])
-    rise_a, rise_b = values[i, j, k + 1] - a, values[i, j + 1, k + 1] - b
-    rise_c, rise_d = values[i + 1, j, k + 1] - c, values[i + 1, j + 1, k + 1] - d
+    i, x, off_x = _cell(x, shape[0])
+    j, y, off_y = _cell(y, shape[1])
+    k, z, off_z = _cell(z, shape[2])
+    a, a1, b, b1, c, c1, d, d1 = _corners(values, shape, i, j, k)
+    rise_a, rise_b, rise_c, rise_d = a1 - a, b1 - b, c1 - c, d1 - d
     a, b, c, d = a + z * rise_a, b + z * rise_b, c + z * rise_c, d + z * rise_d
     left, right = b - a, d - c
     near, far = a + y * left, c + y * right
@@ -62,8 +97,16 @@ def _look_up(
 def distances(values: Floats, lower: Array, spacing: float, points: Floats) -> Floats:
     """Distance (n,) at points (3, n)."""
     found = np.empty(points.shape[1], np.float32)
+    flat, nodes = values.ravel(), 1 / spacing
     for n in range(points.shape[1]):
-        found[n] = _look_up(values, lower, spacing, points[0, n], points[1, n], points[2, n])[0]
+        found[n] = _distance(
+            flat,
+            values.shape,
+            spacing,
+            (points[0, n] - lower[0]) * nodes,
+            (points[1, n] - lower[1]) * nodes,
+            (points[2, n] - lower[2]) * nodes,
+        )
     return found
 
 
@@ -74,9 +117,15 @@ def distances_and_gradients(
     """Distance (n,) and gradient (3, n) at points (3, n)."""
     found = np.empty(points.shape[1], np.float32)
     slope = np.empty(points.shape, np.float32)
+    flat, nodes = values.ravel(), 1 / spacing
     for n in range(points.shape[1]):
         found[n], slope[0, n], slope[1, n], slope[2, n] = _look_up(
-            values, lower, spacing, points[0, n], points[1, n], points[2, n]
+            flat,
+            values.shape,
+            spacing,
+            (points[0, n] - lower[0]) * nodes,
+            (points[1, n] - lower[1]) * nodes,
+            (points[2, n] - lower[2]) * nodes,
         )
     return found, slope
 
@@ -96,7 +145,7 @@ def explained(
     """See `Verifier.score`: of placements (B, 4, 4) and observed points (n, 3), (B,); unit : metres
     of one unit of the grid."""
     found = np.empty(len(T_model_cam))
-    inverse = 1 / unit
+    flat, nodes = values.ravel(), 1 / spacing
     for b in range(len(T_model_cam)):
         T = T_model_cam[b]
         a = T[:3, :3]
@@ -106,16 +155,27 @@ def explained(
             + a[0, 2] * (a[1, 0] * a[2, 1] - a[1, 1] * a[2, 0])
         )
         metres = unit / det ** (1 / 3)
+        grid = _in_nodes(T, lower, nodes, unit)
         total = 0.0
         for n in range(len(seen)):
-            x, y, z = _moved(T, seen[n, 0], seen[n, 1], seen[n, 2])
-            value = _look_up(values, lower, spacing, x * inverse, y * inverse, z * inverse)[0]
-            off = abs(value) * metres
-            # See `geometry.bell`.
-            total += math.exp(max(-0.5 * (off / near) ** 2, -80.0))
+            x, y, z = _moved(grid, seen[n, 0], seen[n, 1], seen[n, 2])
+            off = abs(_distance(flat, values.shape, spacing, x, y, z)) * metres
+            # See `geometry.bell`; beyond, it is next to nothing, and takes its time.
+            if off < 6 * near:
+                total += math.exp(-0.5 * (off / near) ** 2)
             total -= distance * min(off / far, 1.0)
         found[b] = total / len(seen)
     return found
+
+
+@compiled
+def _in_nodes(T: Array, lower: Array, nodes: float, unit: float) -> Array:
+    """(3, 4), from metres to nodes: T (4, 4), and then from metres to nodes of a grid with so many
+    of them in each of its units."""
+    grid = T[:3] * (nodes / unit)
+    for axis in range(3):
+        grid[axis, 3] -= lower[axis] * nodes
+    return grid
 
 
 @compiled
@@ -142,8 +202,9 @@ def contradicted(
             total += min(max((below - tolerance) / slope, 0.0), 1.0)
             if z <= 0:
                 continue
-            u = np.rint(x / z * K[0, 0] + K[0, 2])
-            v = np.rint(y / z * K[1, 1] + K[1, 2])
+            away = 1 / z
+            u = np.rint(x * away * K[0, 0] + K[0, 2])
+            v = np.rint(y * away * K[1, 1] + K[1, 2])
             if u >= 0 and u < width and v >= 0 and v < height:
                 gap = depth[int(v), int(u)] - z
                 # Where no depth is, nothing speaks against it.
@@ -180,7 +241,9 @@ def refined(
     """See `refine_to_sdf`: placements (B, 4, 4) after the steps; unit : metres of one unit of the
     grid; unknowns : 6, or 7 with the size."""
     found = T_model_cam.copy()
-    inverse = 1 / unit
+    flat, nodes = values.ravel(), 1 / spacing
+    inverse = nodes / unit
+    first = (lower[0] * nodes, lower[1] * nodes, lower[2] * nodes)
     normal, fall = np.empty((unknowns, unknowns)), np.empty(unknowns)
     row, step = np.empty(7), np.zeros(7)
     for b in range(len(found)):
@@ -190,7 +253,12 @@ def refined(
             for n in range(len(observed)):
                 x, y, z = _moved(T, observed[n, 0], observed[n, 1], observed[n, 2])
                 value, gx, gy, gz = _look_up(
-                    values, lower, spacing, x * inverse, y * inverse, z * inverse
+                    flat,
+                    values.shape,
+                    spacing,
+                    x * inverse - first[0],
+                    y * inverse - first[1],
+                    z * inverse - first[2],
                 )
                 value *= unit
                 if abs(value) >= reach:

@@ -97,7 +97,9 @@ class TurnConfig:
     best one's by `worse` metres; distances beyond `far` metres count as that. One takes the place
     of the first if it is better by `gain` standard errors. Those that are worse by no more than
     `undecided` standard errors, in alignment score by no more than `alike`, and in the likelihood
-    of the frame by no more than `nats`, are as probable.
+    of the frame by no more than `nats`, are as probable; of those that are worse by `refined_nats`
+    more at most, the best `refined` are refined first, as the first one was. The most probable of
+    all takes the place of the first.
     """
 
     turns: int = 36
@@ -118,6 +120,8 @@ class TurnConfig:
     gain: float = 2.0
     undecided: float = 3.0
     nats: float = 2.0
+    refined_nats: float = 6.0
+    refined: int = 3
     alike: float = 0.1
 
 

@@ -137,15 +137,13 @@ def reconstruct_by_hypotheses(
                     explained = max(explained, probability)
             return found
 
+        def nearer(each: Hypothesis) -> Hypothesis:
+            return refined(each, verifier, wave, hypotheses, views.rays())
+
         def weighed(found: list[list[Hypothesis]]) -> tuple[list[Hypothesis], list[float], Array]:
             placed = [each for group in found for each in group]
             shares = [p for (_, p), group in zip(chosen, found, strict=True) for _ in group]
-            placed, alone = judged(
-                placed,
-                seen,
-                hypotheses,
-                lambda each: refined(each, verifier, wave, hypotheses, views.rays()),
-            )
+            placed, alone = judged(placed, seen, hypotheses, nearer)
             joint = alone
             if views and max(alone, default=-np.inf) > -views.config.against:
                 placed, joint = _in_all_views(
@@ -189,16 +187,16 @@ def reconstruct_by_hypotheses(
         kept = _kept(shared, hypotheses.map)
         alike: dict[int, Array] = {}
         for i in kept[kept < len(placed)]:
-            placed[i] = refined(placed[i], verifier, wave, hypotheses, views.rays())
+            placed[i] = nearer(placed[i])
             if not views:
                 judge = partial(
                     _log_likelihood, model=placed[i].model, seen=seen, config=hypotheses
                 )
                 best = turned(
-                    placed[i], verifier, hypotheses.sensor.patch, hypotheses.search, judge
+                    placed[i], verifier, hypotheses.sensor.patch, hypotheses.search, judge, nearer
                 )
                 if best.best is not placed[i]:
-                    placed[i] = refined(best.best, verifier, wave, hypotheses, views.rays())
+                    placed[i] = nearer(best.best)
                 alike[i] = best.alike
         shapes = [
             placed_shape(placed[i], observation.points, wave, hypotheses, views, alike.get(i))

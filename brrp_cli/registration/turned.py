@@ -8,7 +8,7 @@ and what they cannot decide is kept.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from weakref import WeakKeyDictionary
@@ -36,7 +36,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Turned:
-    """best : the placement that fits best; alike : (K, 4, 4) T_cam_model of others, turned
+    """best : the most probable placement; alike : (K, 4, 4) T_cam_model of others, turned
     otherwise, that what was seen does not tell apart from it"""
 
     best: Hypothesis
@@ -49,11 +49,13 @@ def turned(
     patch: float,
     config: SearchConfig,
     judge: Callable[[Array], float],
+    refine: Callable[[Hypothesis], Hypothesis],
 ) -> Turned:
-    """`placed`, or where it fits what was seen better, turned about itself; and what fits as well.
+    """`placed`, or turned about itself where that is more probable; and what is nearly as probable.
 
     patch : metres; pixels within one err together and are one vote
     judge : log likelihood ratio, nats, of a placement T_cam_model (4, 4)
+    refine : brings a placement as near as `placed` came, which takes its time
     """
     turn = config.about_itself
     start = _nearly_itself(placed, turn)
@@ -84,12 +86,35 @@ def turned(
     first = int(np.argmin(np.where(_as_much_alike(T, placed, verifier, config), better, np.inf)))
     worse, doubt = _worse_than(first, exact, points, patch)
     undecided = (worse <= turn.undecided * doubt) & (_angles(T, T[first]) >= turn.apart)
-    alike = np.flatnonzero(undecided)
-    if len(alike):
-        least = judge(T[first]) - turn.nats
-        alike = alike[[judge(T[row]) >= least for row in alike]]
     best = placed if first == 0 else replace(placed, T_cam_model=T[first])
-    return Turned(best, np.asarray(T[alike]))
+    if not undecided.any():
+        return Turned(best, np.empty((0, 4, 4)))
+    own = judge(best.T_cam_model)
+    others = [replace(best, T_cam_model=each) for each in T[undecided]]
+    found = [(own, best), *_as_probable(others, own - turn.nats, turn, judge, refine)]
+    # The first of those that are equal.
+    most = max(range(len(found)), key=lambda row: found[row][0])
+    _, best = found.pop(most)
+    return Turned(best, np.array([each.T_cam_model for _, each in found]).reshape(-1, 4, 4))
+
+
+def _as_probable(
+    placed: Sequence[Hypothesis],
+    least: float,
+    config: TurnConfig,
+    judge: Callable[[Array], float],
+    refine: Callable[[Hypothesis], Hypothesis],
+) -> list[tuple[float, Hypothesis]]:
+    """Log likelihood ratio, nats, and placement of those for which it is `least` or more. What is
+    not far below it is refined first: half a degree by which it is off may cost so much."""
+    found = [(judge(each.T_cam_model), each) for each in placed]
+    below = [row for row, (ratio, _) in enumerate(found) if ratio < least]
+    below.sort(key=lambda row: -found[row][0])
+    for row in below[: config.refined]:
+        if found[row][0] >= least - config.refined_nats:
+            nearer = refine(found[row][1])
+            found[row] = judge(nearer.T_cam_model), nearer
+    return [each for each in found if each[0] >= least]
 
 
 # Of stored shapes, by what they were compared with: it takes as long as a step of the search.

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from scipy.spatial.transform import Rotation
 from table_scene import MESHES, PARAMETERS, TABLE, in_camera, photograph, placed, stored
@@ -36,6 +38,11 @@ def undecided(T_cam_model):
     return 0.0
 
 
+def as_it_is(hypothesis):
+    """A placement that cannot be brought nearer."""
+    return hypothesis
+
+
 def apart(T, truth):
     """Radians between two placements."""
     return Rotation.from_matrix((np.linalg.inv(truth) @ T)[:3, :3]).magnitude()
@@ -44,7 +51,7 @@ def apart(T, truth):
 def test_a_fruit_is_turned_to_where_its_dents_were_seen():
     model, truth, verifier = seen("fruit")
     wrong = truth @ similarity(rotation=Rotation.from_rotvec([0, 0, 2.0]).as_matrix())
-    found = turned(Hypothesis(model, wrong, 1.0, 0.9), verifier, PATCH, CONFIG, undecided)
+    found = turned(Hypothesis(model, wrong, 1.0, 0.9), verifier, PATCH, CONFIG, undecided, as_it_is)
     assert apart(found.best.T_cam_model, truth) < 0.1 < apart(wrong, truth)
     assert found.best.alignment_score == 0.9
     assert not len(found.alike), "what was seen tells the others apart"
@@ -53,19 +60,19 @@ def test_a_fruit_is_turned_to_where_its_dents_were_seen():
 def test_what_fits_stays_as_it_is():
     model, truth, verifier = seen("fruit")
     right = Hypothesis(model, truth, 1.0, 0.9)
-    assert turned(right, verifier, PATCH, CONFIG, undecided).best is right
+    assert turned(right, verifier, PATCH, CONFIG, undecided, as_it_is).best is right
 
 
 def test_nothing_is_like_an_ell():
     model, truth, verifier = seen("ell")
     right = Hypothesis(model, truth, 1.0, 0.9)
-    found = turned(right, verifier, PATCH, CONFIG, undecided)
+    found = turned(right, verifier, PATCH, CONFIG, undecided, as_it_is)
     assert found.best is right and found.alike.shape == (0, 4, 4)
 
 
 def test_a_box_may_as_well_stand_back_to_front():
     model, truth, verifier = seen("box")
-    found = turned(Hypothesis(model, truth, 1.0, 0.9), verifier, PATCH, CONFIG, undecided)
+    found = turned(Hypothesis(model, truth, 1.0, 0.9), verifier, PATCH, CONFIG, undecided, as_it_is)
     angles = np.array([apart(T, found.best.T_cam_model) for T in found.alike])
     assert len(angles) and (angles > 3.0).all()
 
@@ -95,5 +102,38 @@ def test_what_the_frame_speaks_against_is_not_as_probable():
         return -5.0 * (apart(T_cam_model, truth) > 3.0)
 
     box = Hypothesis(model, truth, 1.0, 0.9)
-    assert len(turned(box, verifier, PATCH, CONFIG, undecided).alike)
-    assert not len(turned(box, verifier, PATCH, CONFIG, judge).alike)
+    assert len(turned(box, verifier, PATCH, CONFIG, undecided, as_it_is).alike)
+    assert not len(turned(box, verifier, PATCH, CONFIG, judge, as_it_is).alike)
+
+
+def test_the_most_probable_of_those_alike_takes_the_place_of_the_first():
+    model, truth, verifier = seen("box")
+
+    def judge(T_cam_model):
+        return float(apart(T_cam_model, truth) < 0.1)
+
+    back_to_front = truth @ similarity(rotation=Rotation.from_rotvec([0, 0, np.pi]).as_matrix())
+    first = Hypothesis(model, back_to_front, 1.0, 0.9)
+    found = turned(first, verifier, PATCH, CONFIG, judge, as_it_is)
+    assert apart(found.best.T_cam_model, truth) < 0.1
+    assert any(np.array_equal(each, back_to_front) for each in found.alike)
+
+
+def test_one_that_is_not_quite_there_is_brought_nearer_before_it_is_judged():
+    model, truth, verifier = seen("box")
+    exact = truth @ similarity(rotation=Rotation.from_rotvec([0, 0, np.pi]).as_matrix())
+
+    def judge(T_cam_model):
+        right = np.array_equal(T_cam_model, truth) or np.array_equal(T_cam_model, exact)
+        return 0.0 if right else -5.0
+
+    def refine(hypothesis):
+        return replace(hypothesis, T_cam_model=exact)
+
+    box = Hypothesis(model, truth, 1.0, 0.9)
+    assert not len(turned(box, verifier, PATCH, CONFIG, judge, as_it_is).alike)
+    found = turned(box, verifier, PATCH, CONFIG, judge, refine)
+    assert found.best is box
+    assert len(found.alike) and all(np.array_equal(each, exact) for each in found.alike)
+    few = replace(CONFIG, about_itself=replace(CONFIG.about_itself, refined_nats=2.0))
+    assert not len(turned(box, verifier, PATCH, few, judge, refine).alike)
