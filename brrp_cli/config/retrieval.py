@@ -89,13 +89,14 @@ class AlignmentConfig:
 
     from_objects : size of the prior from which on they are. Fewer objects are told apart without
         it, `likeness` in place of `fusion`, and real depth lowers the scores of the right one too
-    tried : objects that are laid over what is seen, the most probable by their likenesses, so many
-        of those with colours and of those without; margin : nats by which theirs may be less than
-        the best one's; first : weight, in nats, of the score that they reach in the first few steps
+    tried : objects that are laid over what is seen in one round after another, the most probable by
+        their likenesses first, so many of those with colours and of those without; hasty_rounds :
+        of these, of a mask that is only tried; margin : nats by which their likeness may be less
+        than the best one's; first : weight, in nats, of the score that they reach
     most : objects whose placements are refined, the best by likenesses and first score; where none
         of them reaches the score `enough`, so are the next `more`
-    rounds : of so many objects, the most probable first; one that reaches the score `certain` ends
-        them; hasty_rounds : of a mask that is only tried
+    certain : the rounds end with one that reaches this score, and where none of those left could
+        become the most probable
     last : objects that are refined once more in the end, the best by likeness and score; the more
         points, the better shapes that are nearly alike are told apart
     least_points : of the object that have to be seen
@@ -109,8 +110,7 @@ class AlignmentConfig:
     """
 
     from_objects: int = 100
-    tried: int = 80
-    rounds: int = 3
+    tried: tuple[int, ...] = (24, 56, 80, 80)
     hasty_rounds: int = 1
     certain: float = share(0.92)
     margin: float = 12.0

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -76,21 +77,27 @@ class Steps:
         shuffled = points[np.random.default_rng(seed).permutation(len(points))]
         seen = self._aligner.on(shuffled, image.frame, image.plane, image.wave)
         alignment = np.full(len(look.rows), own.unaligned, np.float32)
-        rounds = min(own.hasty_rounds, own.rounds) if hasty else own.rounds
-        for begin in range(0, rounds * own.tried, own.tried):
+        looks = np.log(np.maximum(likely, np.finfo(float).tiny))
+        ends = np.cumsum(own.tried[: own.hasty_rounds] if hasty else own.tried).tolist()
+        for begin, end in pairwise([0, *ends]):
             # In the prior's order, in which shards hold them.
-            tried = np.sort(np.concatenate([kind[begin : begin + own.tried] for kind in ranked]))
+            tried = np.sort(np.concatenate([kind[begin:end] for kind in ranked]))
             first = seen.first_scores(named(tried))
-            promise = np.log(likely[tried]) + own.first * first
+            promise = looks[tried] + own.first * first
             order = tried[np.argsort(-promise, kind="stable")]
             for chosen in (order[: own.most], order[own.most : own.most + own.more]):
                 found = seen.scores(named(chosen))
                 alignment[chosen] = np.maximum(found, own.lowest)
                 if found.max(initial=0.0) >= own.enough:
                     break
+            promise = looks + own.first * alignment
+            left = np.concatenate([kind[end:] for kind in ranked])
+            # With a score of 1, the best there is, none of those left would be the most probable.
+            if promise.max() > looks[left].max(initial=-np.inf) + own.first:
+                break
             if alignment.max(initial=0.0) >= own.certain:
                 break
-        promise = np.log(np.maximum(likely, np.finfo(float).tiny)) + own.first * alignment
+        promise = looks + own.first * alignment
         promise[alignment <= own.lowest] = -np.inf
         last = np.argsort(-promise, kind="stable")[: own.last]
         last = np.sort(last[np.isfinite(promise[last])])

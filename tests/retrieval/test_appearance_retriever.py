@@ -191,20 +191,39 @@ def test_more_objects_are_tried_until_one_lies_well(prior):
     frame, names = scene()
 
     def aligned(**numbers):
-        aligner = retriever_of(prior, True, tried=1, margin=100.0, unaligned=0.1, **numbers)
+        aligner = retriever_of(prior, True, margin=100.0, unaligned=0.1, **numbers)
         found = aligner.evidence(frame)
         return {i: int((found[i].alignment > 0.1).sum()) for i in (*names, STRANGER)}
 
-    assert set(aligned(rounds=1).values()) == {1}
+    assert set(aligned(tried=(1,)).values()) == {1}
     # The stranger lies well on nothing, so that all are tried; the others end with their own.
-    until = aligned(rounds=5, certain=0.85)
+    until = aligned(tried=(1,) * 5, certain=0.85)
     assert until[STRANGER] > max(until[i] for i in names) == 1
-    assert min(aligned(rounds=5, certain=1.0).values()) > 1
+    assert min(aligned(tried=(2,), certain=1.0).values()) > 1
+
+
+def test_rounds_end_where_none_of_those_left_could_become_the_most_probable(prior):
+    frame, names = scene()
+
+    def aligned(first):
+        aligner = retriever_of(
+            prior, True, tried=(1,) * 5, margin=100.0, unaligned=0.1, certain=1.0, first=first
+        )
+        found = aligner.evidence(frame)
+        return {i: int((found[i].alignment > 0.1).sum()) for i in names}
+
+    # The more alignment scores weigh beside looks, the longer the others have a chance; but
+    # not beside what lies perfectly, as one of the things does.
+    few, many = aligned(0.1), aligned(10_000.0)
+    assert set(few.values()) == {1}
+    assert sum(tried > 1 for tried in many.values()) >= len(names) - 1
 
 
 def test_in_haste_fewer_objects_are_tried_and_what_is_known_is_used(prior):
     frame, _ = scene()
-    aligner = retriever_of(prior, True, tried=1, margin=100.0, unaligned=0.1, certain=1.0, rounds=5)
+    aligner = retriever_of(
+        prior, True, tried=(1,) * 5, margin=100.0, unaligned=0.1, certain=1.0, first=10_000.0
+    )
 
     def tried():
         return int((aligner.evidence(frame)[STRANGER].alignment > 0.1).sum())
