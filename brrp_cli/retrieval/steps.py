@@ -90,10 +90,10 @@ class Steps:
                 alignment[chosen] = np.maximum(found, own.lowest)
                 if found.max(initial=0.0) >= own.enough:
                     break
-            promise = looks + own.first * alignment
             left = np.concatenate([kind[end:] for kind in ranked])
             # With a score of 1, the best there is, none of those left would be the most probable.
-            if promise.max() > looks[left].max(initial=-np.inf) + own.first:
+            worth = config.retrieval.fusion.alignment
+            if (looks + worth * alignment).max() > looks[left].max(initial=-np.inf) + worth:
                 break
             if alignment.max(initial=0.0) >= own.certain:
                 break

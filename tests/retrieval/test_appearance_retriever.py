@@ -45,12 +45,16 @@ def aligner(prior):
     return retriever_of(prior, True)
 
 
-def retriever_of(prior, aligned, name="default", **numbers):
-    """Of a small prior, whose objects are aligned only where that is asked for."""
+def retriever_of(prior, aligned, name="default", worth=None, **numbers):
+    """Of a small prior, whose objects are aligned only where that is asked for; worth : nats of an
+    alignment score of 1."""
     config = preset(name)
     if aligned:
         alignment = dataclasses.replace(config.retrieval.alignment, from_objects=1, **numbers)
-        own = dataclasses.replace(config.retrieval, alignment=alignment)
+        fusion = config.retrieval.fusion
+        if worth is not None:
+            fusion = dataclasses.replace(fusion, alignment=worth)
+        own = dataclasses.replace(config.retrieval, alignment=alignment, fusion=fusion)
         config = dataclasses.replace(config, retrieval=own)
     return AppearanceRetriever(prior, config, 0)
 
@@ -205,9 +209,9 @@ def test_more_objects_are_tried_until_one_lies_well(prior):
 def test_rounds_end_where_none_of_those_left_could_become_the_most_probable(prior):
     frame, names = scene()
 
-    def aligned(first):
+    def aligned(worth):
         aligner = retriever_of(
-            prior, True, tried=(1,) * 5, margin=100.0, unaligned=0.1, certain=1.0, first=first
+            prior, True, tried=(1,) * 5, margin=100.0, unaligned=0.1, certain=1.0, worth=worth
         )
         found = aligner.evidence(frame)
         return {i: int((found[i].alignment > 0.1).sum()) for i in names}
@@ -222,7 +226,7 @@ def test_rounds_end_where_none_of_those_left_could_become_the_most_probable(prio
 def test_in_haste_fewer_objects_are_tried_and_what_is_known_is_used(prior):
     frame, _ = scene()
     aligner = retriever_of(
-        prior, True, tried=(1,) * 5, margin=100.0, unaligned=0.1, certain=1.0, first=10_000.0
+        prior, True, tried=(1,) * 5, margin=100.0, unaligned=0.1, certain=1.0, worth=10_000.0
     )
 
     def tried():
