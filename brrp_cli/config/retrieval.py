@@ -92,10 +92,11 @@ class AlignmentConfig:
     tried : objects that are laid over what is seen in one round after another, the most probable by
         their likenesses first, so many of those with colours and of those without; hasty_rounds :
         of these, of a mask that is only tried; margin : nats by which their likeness may be less
-        than the best one's; first : weight, in nats, of the score that they reach
+        than the best one's; first : weight, in nats, of the score that they reach in the first few
+        steps
     most : objects whose placements are refined, the best by likenesses and first score; where none
         of them reaches the score `enough`, so are the next `more`
-    certain : the rounds end with one that reaches this score, and where none of those left could
+    certain : the rounds end with one that reaches this score, or where none of those left could
         become the most probable
     last : objects that are refined once more in the end, the best by likeness and score; the more
         points, the better shapes that are nearly alike are told apart
