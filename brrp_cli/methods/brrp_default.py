@@ -195,9 +195,7 @@ def reconstruct_by_hypotheses(
                 best = turned(
                     placed[i], verifier, hypotheses.sensor.patch, hypotheses.search, judge, nearer
                 )
-                if best.best is not placed[i]:
-                    placed[i] = nearer(best.best)
-                alike[i] = best.alike
+                placed[i], alike[i] = best.best, best.alike
         shapes = [
             placed_shape(placed[i], observation.points, wave, hypotheses, views, alike.get(i))
             if i < len(placed)

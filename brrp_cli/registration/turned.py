@@ -36,7 +36,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Turned:
-    """best : the most probable placement; alike : (K, 4, 4) T_cam_model of others, turned
+    """best : the most probable placement, refined; alike : (K, 4, 4) T_cam_model of others, turned
     otherwise, that what was seen does not tell apart from it"""
 
     best: Hypothesis
@@ -86,7 +86,8 @@ def turned(
     first = int(np.argmin(np.where(_as_much_alike(T, placed, verifier, config), better, np.inf)))
     worse, doubt = _worse_than(first, exact, points, patch)
     undecided = (worse <= turn.undecided * doubt) & (_angles(T, T[first]) >= turn.apart)
-    best = placed if first == 0 else replace(placed, T_cam_model=T[first])
+    # As near as `placed`, which those that are refined would beat unfairly otherwise.
+    best = placed if first == 0 else refine(replace(placed, T_cam_model=T[first]))
     if not undecided.any():
         return Turned(best, np.empty((0, 4, 4)))
     own = judge(best.T_cam_model)
@@ -94,7 +95,8 @@ def turned(
     found = [(own, best), *_as_probable(others, own - turn.nats, turn, judge, refine)]
     # The first of those that are equal.
     most = max(range(len(found)), key=lambda row: found[row][0])
-    _, best = found.pop(most)
+    _, chosen = found.pop(most)
+    best = best if most == 0 else refine(chosen)
     return Turned(best, np.array([each.T_cam_model for _, each in found]).reshape(-1, 4, 4))
 
 

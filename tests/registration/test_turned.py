@@ -119,6 +119,17 @@ def test_the_most_probable_of_those_alike_takes_the_place_of_the_first():
     assert any(np.array_equal(each, back_to_front) for each in found.alike)
 
 
+def test_the_result_is_as_near_as_what_was_given():
+    model, truth, verifier = seen("fruit")
+    wrong = truth @ similarity(rotation=Rotation.from_rotvec([0, 0, 2.0]).as_matrix())
+
+    def refine(hypothesis):
+        return replace(hypothesis, T_cam_model=truth)
+
+    found = turned(Hypothesis(model, wrong, 1.0, 0.9), verifier, PATCH, CONFIG, undecided, refine)
+    assert np.array_equal(found.best.T_cam_model, truth)
+
+
 def test_one_that_is_not_quite_there_is_brought_nearer_before_it_is_judged():
     model, truth, verifier = seen("box")
     exact = truth @ similarity(rotation=Rotation.from_rotvec([0, 0, np.pi]).as_matrix())
