@@ -53,7 +53,8 @@ def _corners(
 def _distance(
     values: Floats, shape: tuple[int, int, int], spacing: float, x: float, y: float, z: float
 ) -> float:
-    """At a point in nodes; values : of all nodes in a row."""
+    """At a point in nodes; values : of all nodes in a row. `_look_up` for those who need no
+    gradient, in half the time."""
     i, x, off_x = _cell(x, shape[0])
     j, y, off_y = _cell(y, shape[1])
     k, z, off_z = _cell(z, shape[2])
@@ -94,19 +95,21 @@ def _look_up(
 
 
 @compiled
+def _in_nodes(
+    x: float, y: float, z: float, lower: Array, nodes: float
+) -> tuple[float, float, float]:
+    """A point of a grid with so many nodes in each of its units, in nodes."""
+    return (x - lower[0]) * nodes, (y - lower[1]) * nodes, (z - lower[2]) * nodes
+
+
+@compiled
 def distances(values: Floats, lower: Array, spacing: float, points: Floats) -> Floats:
     """Distance (n,) at points (3, n)."""
     found = np.empty(points.shape[1], np.float32)
     flat, nodes = values.ravel(), 1 / spacing
     for n in range(points.shape[1]):
-        found[n] = _distance(
-            flat,
-            values.shape,
-            spacing,
-            (points[0, n] - lower[0]) * nodes,
-            (points[1, n] - lower[1]) * nodes,
-            (points[2, n] - lower[2]) * nodes,
-        )
+        x, y, z = _in_nodes(points[0, n], points[1, n], points[2, n], lower, nodes)
+        found[n] = _distance(flat, values.shape, spacing, x, y, z)
     return found
 
 
@@ -119,13 +122,9 @@ def distances_and_gradients(
     slope = np.empty(points.shape, np.float32)
     flat, nodes = values.ravel(), 1 / spacing
     for n in range(points.shape[1]):
+        x, y, z = _in_nodes(points[0, n], points[1, n], points[2, n], lower, nodes)
         found[n], slope[0, n], slope[1, n], slope[2, n] = _look_up(
-            flat,
-            values.shape,
-            spacing,
-            (points[0, n] - lower[0]) * nodes,
-            (points[1, n] - lower[1]) * nodes,
-            (points[2, n] - lower[2]) * nodes,
+            flat, values.shape, spacing, x, y, z
         )
     return found, slope
 
@@ -155,7 +154,7 @@ def explained(
             + a[0, 2] * (a[1, 0] * a[2, 1] - a[1, 1] * a[2, 0])
         )
         metres = unit / det ** (1 / 3)
-        grid = _in_nodes(T, lower, nodes, unit)
+        grid = _to_nodes(T, lower, nodes, unit)
         total = 0.0
         for n in range(len(seen)):
             x, y, z = _moved(grid, seen[n, 0], seen[n, 1], seen[n, 2])
@@ -169,7 +168,7 @@ def explained(
 
 
 @compiled
-def _in_nodes(T: Array, lower: Array, nodes: float, unit: float) -> Array:
+def _to_nodes(T: Array, lower: Array, nodes: float, unit: float) -> Array:
     """(3, 4), from metres to nodes: T (4, 4), and then from metres to nodes of a grid with so many
     of them in each of its units."""
     grid = T[:3] * (nodes / unit)
@@ -242,8 +241,7 @@ def refined(
     grid; unknowns : 6, or 7 with the size."""
     found = T_model_cam.copy()
     flat, nodes = values.ravel(), 1 / spacing
-    inverse = nodes / unit
-    first = (lower[0] * nodes, lower[1] * nodes, lower[2] * nodes)
+    inverse = 1 / unit
     normal, fall = np.empty((unknowns, unknowns)), np.empty(unknowns)
     row, step = np.empty(7), np.zeros(7)
     for b in range(len(found)):
@@ -252,14 +250,8 @@ def refined(
             normal[:], fall[:] = 0.0, 0.0
             for n in range(len(observed)):
                 x, y, z = _moved(T, observed[n, 0], observed[n, 1], observed[n, 2])
-                value, gx, gy, gz = _look_up(
-                    flat,
-                    values.shape,
-                    spacing,
-                    x * inverse - first[0],
-                    y * inverse - first[1],
-                    z * inverse - first[2],
-                )
+                at = _in_nodes(x * inverse, y * inverse, z * inverse, lower, nodes)
+                value, gx, gy, gz = _look_up(flat, values.shape, spacing, at[0], at[1], at[2])
                 value *= unit
                 if abs(value) >= reach:
                     continue
