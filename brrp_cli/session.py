@@ -56,7 +56,7 @@ class Reconstructor:
     config, weights, seed, device, workers : as in `reconstruct`
     retriever : a name as `brrp reconstruct --retriever` takes it
     prompt : makes masks of what it names where a frame has none; None = of what stands on the
-        table, without a model; segmentation : the numbers of both
+        table; segmentation : the numbers of both
     track : whether frames are those of one stream: an object keeps its id, and one that has not
         moved before a camera that stands keeps its result, and what earlier frames showed of one
         at rest joins what the newest shows; or the numbers of that

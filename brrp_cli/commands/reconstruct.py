@@ -171,7 +171,7 @@ def command(
     """Turn an RGBD frame into a closed mesh for every object.
 
     SOURCE is a frame file or anything else that `brrp frame` reads; or name the images of one
-    frame. Where there are no masks they are made: by --prompt, else without a model. A picture of
+    frame. Where there are no masks they are made: by --prompt, else from depth. A picture of
     them is written beside the output; `brrp segment OUT/frame.npz` corrects them.
 
     The prior is --prior, else BRRP_PRIOR, else the one in the user's data folder, else the

@@ -47,7 +47,7 @@ _OPTIONS = [
         "--all",
         "keep_all",
         is_flag=True,
-        help="With masks without a model: also of what the image's border cuts or that stands"
+        help="With masks from depth: also of what the image's border cuts or that stands"
         " nowhere on the table.",
     ),
     click.option("--index", metavar="N|NAME", help="Which frame, where SOURCE holds many."),
@@ -126,7 +126,7 @@ class SourceOptions:
         if self.masks is not None and self.prompt is not None:
             raise click.UsageError("--masks and --prompt exclude each other")
         if self.keep_all and (self.masks is not None or self.prompt is not None):
-            raise click.UsageError("--all goes with masks that are made without a model")
+            raise click.UsageError("--all goes with masks that are made from depth")
         if self.masks_dir is not None and self.prompt is None:
             raise click.UsageError("--masks-dir goes with --prompt")
         for path in (self.path, self.color, self.depth, self.intrinsics, self.masks):
@@ -183,7 +183,7 @@ class SourceOptions:
     def make_masks(
         self, frame: Frame, seed: int, config: SegmentConfig | None = None
     ) -> tuple[Frame, NDArray[np.int64] | None]:
-        """The frame with masks made anew, by the prompt where there is one, else without a model;
+        """The frame with masks made anew, by the prompt where there is one, else from depth;
         and the masks (H, W) that were left out, 0 = none.
 
         Errors: FrameError if nothing is found; MaskError if the models cannot be used.

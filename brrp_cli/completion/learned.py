@@ -1,14 +1,11 @@
 """The completion that has learned shapes, as it comes with the package.
 
 `tools/train_completion.py` trains it and says on what; brrp_cli/completion/shapes.safetensors holds
-it, in half precision. The metadata has `format`, `network` (JSON of its ShapeNetworkConfig) and
-`training` (JSON: on what, how much, how well).
+it (network_files.py).
 """
 
 from __future__ import annotations
 
-import json
-from dataclasses import asdict
 from functools import cache
 from importlib.resources import as_file, files
 from pathlib import Path
@@ -21,9 +18,7 @@ from brrp_cli.completion.point_features import point_features
 from brrp_cli.completion.visible_part import VisiblePart
 from brrp_cli.completion.volume import volume_of
 from brrp_cli.config import VolumeConfig
-from brrp_cli.dependencies import import_library
-from brrp_cli.errors import WeightsError
-from brrp_cli.files import write_bytes
+from brrp_cli.network_files import load_network, save_network
 
 if TYPE_CHECKING:
     from torch import Tensor
@@ -73,48 +68,18 @@ class LearnedShape:
 
 
 def save_shapes(network: ShapeNetwork, training: dict[str, Any], path: Path) -> None:
-    """Write the file, in half precision, whole or not at all. Errors: OutputError."""
-    import torch
-
-    tensors = {
-        name: tensor.detach().to(torch.float16).contiguous()
-        for name, tensor in network.state_dict().items()
-    }
-    metadata = {
-        "format": FORMAT,
-        "network": json.dumps(asdict(network.config)),
-        "training": json.dumps(training),
-    }
-    write_bytes(path, import_library("safetensors.torch").save(tensors, metadata=metadata))
+    """Write the file, whole or not at all. Errors: OutputError."""
+    save_network(network, network.config, FORMAT, training, path)
 
 
 def load_shapes(path: Path) -> ShapeNetwork:
     """The network of a file. Errors: WeightsError if it is missing, damaged or of another kind."""
-    import torch
-
     from brrp_cli.completion.shape_network import ShapeNetwork, ShapeNetworkConfig
 
-    try:
-        with import_library("safetensors").safe_open(path, framework="pt") as file:
-            metadata = file.metadata() or {}
-            tensors = {name: file.get_tensor(name).to(torch.float32) for name in file.keys()}  # noqa: SIM118
-        if metadata.get("format") != FORMAT:
-            raise ValueError(f"its format is {metadata.get('format')}")
-        config = json.loads(metadata["network"])
-        widths = tuple(config.pop("widths"))
-        # Without numbers of its own: none are drawn from torch's random state.
-        with torch.device("meta"):
-            network = ShapeNetwork(ShapeNetworkConfig(**config, widths=widths))
-        network.load_state_dict(tensors, assign=True)
-    except Exception as error:  # safetensors' own exception, RuntimeError of torch, OSError
-        raise WeightsError(
-            "The weights of the completion cannot be read",
-            where=path,
-            expected=FORMAT,
-            found=error,
-            fix="install brrp-cli again",
-        ) from error
-    return network.eval().requires_grad_(False)
+    def build(config: dict[str, Any]) -> ShapeNetwork:
+        return ShapeNetwork(ShapeNetworkConfig(**{**config, "widths": tuple(config["widths"])}))
+
+    return load_network(path, FORMAT, "the completion", build)
 
 
 @cache

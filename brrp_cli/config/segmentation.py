@@ -1,4 +1,4 @@
-"""Numbers of masks that are made without a model (brrp_cli/segmentation). Lengths are metres."""
+"""Numbers of masks that are made without a prior (brrp_cli/segmentation). Lengths are metres."""
 
 from __future__ import annotations
 
@@ -62,8 +62,6 @@ class ConcaveEdgesConfig:
     reach : pixels to each side across which a crease is looked for; normal_step : pixels of the
         difference quotients of normals
     flat, sharp : degrees between both sides' normals: no crease, and surely one
-    faint : part of `flat` and `sharp` that is enough where colour changes by `colour` levels of
-        255; 1 = colour does not matter. Less parts more stacked things and cuts more real ones
     near : metres; sides farther apart are two surfaces, whatever their normals
     steep : slope beyond which depth jumps; jump : metres that it jumps at least
     """
@@ -72,8 +70,6 @@ class ConcaveEdgesConfig:
     normal_step: int = 2
     flat: float = between(30.0, 0.0, 180.0)
     sharp: float = between(60.0, 0.0, 180.0)
-    faint: float = share(1.0)
-    colour: float = 120.0
     near: float = 0.05
     steep: float = 6.0
     jump: float = 0.008
@@ -84,64 +80,49 @@ class ComponentsConfig:
     """Parts that boundaries enclose.
 
     calm : of boundary, at most, in the middle of a part; least_core : pixels of that middle
-    least_border : pixels of a common border; meet : part of a border that is a crease, from which
-    on two parts meet in one; neck : width of a border that joins nothing, as a part of the smaller
-    part's width
-    levels : of each channel, of histograms; alike : share of their colours that two parts have in
-        common at least, where they are joined over a crease that colour alone made strong
     """
 
-    levels: int = between(4, 2, 32)
-    alike: float = share(0.15)
     calm: float = share(0.3)
     least_core: int = 30
-    least_border: int = 4
-    meet: float = share(0.45)
-    neck: float = share(0.35)
+
+
+@dataclass(frozen=True)
+class AffinitiesConfig:
+    """What the network says of pixels, probabilities.
+
+    colour : what the network says when it sees colours counts so much, and the rest what it says
+        without: real prints and shadows are stranger to it than real depth
+    least : that a pixel shows an object, or it is depth that bled
+    alike : mean affinity of the pixels of two parts from which on they are one object; doubtful :
+        from which on a stored object may show that they are
+    components : the parts that are joined, in pixels of the network's image
+    """
+
+    colour: float = share(0.5)
+    least: float = share(0.1)
+    alike: float = share(0.4)
+    doubtful: float = share(0.1)
+    components: ComponentsConfig = field(default_factory=lambda: ComponentsConfig(least_core=8))
 
 
 @dataclass(frozen=True)
 class FootprintsConfig:
-    """Parts that stand on one spot of the table.
+    """Insides that stand on one spot of the table with their outsides.
 
     cell : metres of the plan's grid
+    overlap : part of the smaller footprint that both share, at least
     inward, facing : mean cosine to the middle: of an inside that shares the footprint, and of
         walls of which one is seen from within and one from without (of a round one 0.9)
     round : part of both footprints that the hull around them may hold besides
     above : metres by which an inside may rise over its outside
-    same_range : part of the lower one's heights that pieces at one height share
-    stands : metres; what is nowhere lower does not stand on the table
-    over, pieces, coloured : parts of the smaller footprint that are shared by what hangs on
-        something and that, by pieces of one thing, by pieces of one vivid colour
     """
 
     cell: float = 0.003
+    overlap: float = share(0.3)
     inward: float = between(0.3, -1.0, 1.0)
     facing: float = between(0.7, -1.0, 1.0)
-    round: float = 0.35
+    round: float = 0.45
     above: float = 0.02
-    same_range: float = share(0.3)
-    stands: float = 0.04
-    over: float = share(0.4)
-    pieces: float = share(0.25)
-    coloured: float = share(0.15)
-
-
-@dataclass(frozen=True)
-class VividColourConfig:
-    """Parts of one vivid colour.
-
-    saturation, value : of a pixel, 0 to 1. Below them hue is noise
-    vivid : share of a part's pixels that are vivid; cameras smear grey of the table over edges
-    spread : degrees of hue, median deviation within a part: more is a printed thing
-    same : degrees of hue between two parts; light from two sides shifts it so much
-    """
-
-    saturation: float = share(0.4)
-    value: float = share(0.3)
-    vivid: float = share(0.35)
-    spread: float = between(10.0, 0.0, 180.0)
-    same: float = between(15.0, 0.0, 180.0)
 
 
 @dataclass(frozen=True)
@@ -256,13 +237,12 @@ class LeftOutConfig:
 
 @dataclass(frozen=True)
 class SegmentConfig:
-    """Masks without a model, and in `prompt` those by a prompt, which use smooth_depth and table.
+    """Masks of what stands on the table, and in `prompt` those by a prompt, which use smooth_depth
+    and table.
 
     min_height, max_height : what rises less above the table is the table. Between the two it is
         `sigmas` deviations of the table's own height, which grow with the square of the distance
     rim : pixels that rise that part of it join an object within `reach`
-    border : parts are joined where their common border is less of a boundary than that (0 to 1)
-    overlap : parts whose footprints share that part of the smaller one may be one object
     margin : how far beside the seen table an object may stand
     min_area : objects that show less of themselves are dropped, metres squared
     """
@@ -272,16 +252,14 @@ class SegmentConfig:
     sigmas: float = 3.5
     rim: float = share(0.7)
     reach: float = 0.008
-    border: float = share(0.45)
-    overlap: float = share(0.3)
     margin: float = 0.03
     min_area: float = 0.0007
     smooth_depth: SmoothDepthConfig = field(default_factory=SmoothDepthConfig)
     table: TableConfig = field(default_factory=TableConfig)
     concave_edges: ConcaveEdgesConfig = field(default_factory=ConcaveEdgesConfig)
     components: ComponentsConfig = field(default_factory=ComponentsConfig)
-    footprints: FootprintsConfig = field(default_factory=FootprintsConfig)
-    vivid_colour: VividColourConfig = field(default_factory=VividColourConfig)
+    affinities: AffinitiesConfig = field(default_factory=AffinitiesConfig)
+    insides: FootprintsConfig = field(default_factory=FootprintsConfig)
     concavities: ConcavitiesConfig = field(default_factory=ConcavitiesConfig)
     stacks: StacksConfig = field(default_factory=StacksConfig)
     borders: BordersConfig = field(default_factory=BordersConfig)

@@ -1,1 +1,1 @@
-"""Segmentation: object masks from depth and colour, without a model or by a phrase."""
+"""Segmentation: object masks from depth and colour, of what stands on a table or by a phrase."""

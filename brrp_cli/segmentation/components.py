@@ -31,40 +31,6 @@ def find_parts(
     return np.asarray(grown, dtype=np.int64)
 
 
-def join_parts(
-    parts: NDArray[np.int64],
-    boundary: NDArray[np.float64],
-    threshold: float,
-    config: ComponentsConfig,
-) -> NDArray[np.int64]:
-    """Labels (H, W) after neighbours whose common border is mostly no boundary were joined, unless
-    the border is but a neck between two wide parts."""
-    border, length = _borders(parts, boundary)
-    return relabel(parts, _wide(parts, length, config) & (border < threshold * length))
-
-
-def join_alike(
-    parts: NDArray[np.int64],
-    boundary: NDArray[np.float64],
-    rgb: NDArray[np.uint8],
-    threshold: float,
-    config: ComponentsConfig,
-) -> NDArray[np.int64]:
-    """`join_parts` of those neighbours alone that have colours in common: what stands on another
-    thing differs from it, pieces of one print do not. rgb : (H, W, 3)"""
-    border, length = _borders(parts, boundary)
-    wide = _wide(parts, length, config) & (border < threshold * length)
-    colours = rgb.astype(np.int64) * config.levels // 256
-    codes = (colours[..., 0] * config.levels + colours[..., 1]) * config.levels + colours[..., 2]
-    shares = np.zeros((len(length), config.levels**3))
-    np.add.at(shares, (parts.ravel(), codes.ravel()), 1.0)
-    shares /= np.maximum(shares.sum(axis=1, keepdims=True), 1.0)
-    alike = np.zeros_like(wide)
-    for i, j in np.argwhere(wide):
-        alike[i, j] = np.minimum(shares[i], shares[j]).sum() > config.alike
-    return relabel(parts, alike)
-
-
 def split_at_strongest(
     parts: NDArray[np.int64], boundary: NDArray[np.float64], pieces: int
 ) -> NDArray[np.int64]:
@@ -81,15 +47,6 @@ def split_at_strongest(
         parts = np.where(parts == second, first, parts)
         assert len(np.unique(parts[parts > 0])) == count - 1
     return parts
-
-
-def contacts(
-    parts: NDArray[np.int64], crease: NDArray[np.floating], config: ComponentsConfig
-) -> NDArray[np.bool_]:
-    """(n + 1, n + 1) whether two parts meet in a hollow crease (H, W), 0 to 1."""
-    border, length = _borders(parts, crease)
-    touch = (length >= config.least_border) & (border > config.meet * length)
-    return np.asarray(touch | touch.T)
 
 
 def absorb_small(
@@ -135,30 +92,6 @@ def _borders(
         np.add.at(border, (low, high), strength[meet])
         np.add.at(length, (low, high), 1.0)
     return border, length
-
-
-def _wide(
-    parts: NDArray[np.int64], length: NDArray[np.float64], config: ComponentsConfig
-) -> NDArray[np.bool_]:
-    """(n + 1, n + 1) whether the common border of two parts is more than a neck."""
-    width = _widths(parts, len(length))
-    neck = np.maximum(config.least_border, config.neck * np.minimum(width, width[:, None]))
-    return np.asarray(length >= neck)
-
-
-def _widths(parts: NDArray[np.int64], count: int) -> NDArray[np.float64]:
-    """(n + 1,) pixels across the widest place of each part."""
-    ndimage = import_library("scipy.ndimage")
-    edges = np.zeros(parts.shape, dtype=bool)
-    for axis in (0, 1):
-        near, marked = np.moveaxis(parts, axis, 0), np.moveaxis(edges, axis, 0)
-        differ = near[1:] != near[:-1]
-        marked[1:] |= differ
-        marked[:-1] |= differ
-    deep = ndimage.distance_transform_edt(~edges & (parts > 0))
-    width = np.zeros(count)
-    np.maximum.at(width, parts.ravel(), 2 * deep.ravel() + 1)
-    return width
 
 
 def _large(labels: NDArray[np.integer], least: int) -> NDArray[np.int64]:

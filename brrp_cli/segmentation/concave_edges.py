@@ -2,7 +2,6 @@
 
 What touches meets in a hollow crease (Stein et al., Object Partitioning using Local Convexity,
 CVPR 2014): a can on a table, two boxes side by side. Within one thing hollow creases are rarer.
-Cameras round creases off: a faint one counts where colour changes with it.
 """
 
 from __future__ import annotations
@@ -11,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brrp_cli.config.segmentation import ConcaveEdgesConfig
-from brrp_cli.dependencies import import_library
 
 Array = NDArray[np.floating]
 
@@ -71,22 +69,6 @@ def hollow_angles(points: Array, normals: Array, config: ConcaveEdgesConfig) -> 
             found = hollow & near & (cosine < least)
         least[found] = cosine[found]
     return np.degrees(np.arccos(np.clip(least, -1, 1)))
-
-
-def colour_edges(rgb: NDArray[np.uint8], config: ConcaveEdgesConfig) -> Array:
-    """(H, W) from 0, none, to 1, a change of colour by `config.colour` levels across the pixel or
-    near it: edges of depth and of colour lie a few pixels apart.
-
-    rgb : (H, W, 3)
-    """
-    ndimage = import_library("scipy.ndimage")
-    step = config.reach
-    smooth = ndimage.uniform_filter(rgb.astype(np.float32), size=(3, 3, 1))
-    smooth = np.pad(smooth, ((step, step), (step, step), (0, 0)), mode="edge")
-    across = smooth[step:-step, 2 * step :] - smooth[step:-step, : -2 * step]
-    down = smooth[2 * step :, step:-step] - smooth[: -2 * step, step:-step]
-    change = np.sqrt(np.maximum(_dot(across, across), _dot(down, down)))
-    return np.clip(ndimage.maximum_filter(change, size=step) / config.colour, 0.0, 1.0)
 
 
 def _dot(first: Array, second: Array) -> Array:

@@ -7,18 +7,29 @@ from numpy.typing import NDArray
 
 from brrp_cli.config.segmentation import SegmentConfig
 from brrp_cli.dependencies import import_library
+from brrp_cli.errors import FrameError
 from brrp_cli.frames.frame import Frame
 from brrp_cli.geometry import backproject
 from brrp_cli.segmentation.components import find_parts, split_at_strongest
 from brrp_cli.segmentation.concave_edges import depth_jumps, hollow_creases, surface_normals
-from brrp_cli.segmentation.smooth_depth import flying_pixels, smooth_depth
+from brrp_cli.segmentation.part_objects import part_objects
+from brrp_cli.segmentation.rising import rising
+from brrp_cli.segmentation.seen_surfaces import see_surfaces, smoothed
 
 
 def boundary_of(frame: Frame, config: SegmentConfig) -> NDArray[np.float64]:
-    """Jumps of depth and hollow creases (H, W), 0 to 1."""
-    raw = np.where(frame.valid, frame.points[..., 2], np.nan)
-    smoothing, edges = config.smooth_depth, config.concave_edges
-    depth = smooth_depth(np.where(flying_pixels(raw, smoothing), np.nan, raw), smoothing)
+    """Where one thing ends (H, W), 0 to 1: jumps of depth, and borders that the network sees, or
+    hollow creases where there is no table, which it needs."""
+    try:
+        seen = see_surfaces(frame, 0, config)
+    except FrameError:
+        return _without_a_table(frame, config)
+    parted = part_objects(frame.rgb, seen, rising(seen, config), config.affinities)
+    return np.maximum(parted.border, seen.jumps)
+
+
+def _without_a_table(frame: Frame, config: SegmentConfig) -> NDArray[np.float64]:
+    depth, edges = smoothed(frame, config), config.concave_edges
     points = backproject(depth, frame.K)
     crease = hollow_creases(points, surface_normals(points, edges), edges)
     return np.maximum(crease, depth_jumps(depth, frame.K, edges))

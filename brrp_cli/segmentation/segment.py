@@ -1,8 +1,8 @@
-"""Object masks without a model: what stands on the table, apart in depth.
+"""Object masks without a prior: what stands on the table, one thing apart from the other.
 
-Depth is smoothed and freed of flying pixels. What rises above the table is cut at jumps of depth
-and at hollow creases, which is how things that touch meet; parts of which one is the inside of the
-other (a mug's walls), or that are of one vivid colour on one spot, are joined again.
+Depth is smoothed and freed of flying pixels. A small network that looks at colour, height, normals
+and edges says which pixels show an object, and which of them the same one; what it joins becomes a
+mask, whose borders then follow colour.
 """
 
 from __future__ import annotations
@@ -12,32 +12,22 @@ import logging
 import numpy as np
 from numpy.typing import NDArray
 
-from brrp_cli.config.segmentation import ConcaveEdgesConfig, SegmentConfig
-from brrp_cli.dependencies import import_library
+from brrp_cli.config.segmentation import SegmentConfig
 from brrp_cli.errors import FrameError
 from brrp_cli.frames.frame import BACKGROUND, Frame
-from brrp_cli.geometry import backproject
-from brrp_cli.segmentation.components import absorb_small, find_parts, join_alike, join_parts
-from brrp_cli.segmentation.concave_edges import (
-    colour_edges,
-    depth_jumps,
-    hollow_angles,
-    strength,
-    surface_normals,
-)
+from brrp_cli.segmentation.components import absorb_small
 from brrp_cli.segmentation.fill_concavities import fill_inside
+from brrp_cli.segmentation.join_insides import join_insides
 from brrp_cli.segmentation.left_out import IN_THE_AIR, left_out, told
-from brrp_cli.segmentation.merge_by_footprint import join_on_one_spot
+from brrp_cli.segmentation.part_objects import part_objects
 from brrp_cli.segmentation.refine_borders import refine_borders
 from brrp_cli.segmentation.region_growing import fill_holes, grow
-from brrp_cli.segmentation.smooth_depth import flying_pixels, smooth_depth
+from brrp_cli.segmentation.rising import rising
+from brrp_cli.segmentation.seen_surfaces import see_surfaces
 from brrp_cli.segmentation.split_stacks import split_stacks
-from brrp_cli.segmentation.table_plane import Table, find_table
+from brrp_cli.segmentation.table_plane import Table
 
 log = logging.getLogger(__name__)
-
-# Of the image, that must have depth which agrees with its neighbours'.
-MIN_SHARE = 0.01
 
 
 def segment(
@@ -61,76 +51,32 @@ def segment_and_aside(
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """What `segment` gives, and the masks (H, W) that it left out because they seem to stand
     nowhere on the table, 0 = none: what lies on something else may look like that."""
-    ndimage = import_library("scipy.ndimage")
     config = config or SegmentConfig()
-    raw = np.where(frame.valid, frame.points[..., 2], np.nan)
-    smoothing = config.smooth_depth
-    depth = smooth_depth(np.where(flying_pixels(raw, smoothing), np.nan, raw), smoothing)
-    points = backproject(depth, frame.K)
-    valid = np.isfinite(depth)
-    if valid.sum() < MIN_SHARE * valid.size:
-        raise FrameError(
-            "Too little depth to find objects in",
-            where=frame.source,
-            expected=f"depth that neighbours agree on, at {MIN_SHARE:.0%} of the pixels or more",
-            found=f"{int(frame.valid.sum())} of {valid.size} pixels have depth,"
-            f" {int(valid.sum())} of them agree with their neighbours",
-            fix="check the depth image and its unit; masks made elsewhere go in by --masks",
-        )
-    table = find_table(points[valid], seed, frame.source, config.table)
-    height = table.plane.signed_distance(points)
-    plan = table.plan(points)
-    lift = _lift(height, depth, config)
-    with np.errstate(invalid="ignore"):
-        on_table = np.zeros(frame.shape, dtype=bool)
-        on_table[valid] = table.holds(plan[valid], config.margin)
-        risen = on_table & (height > lift)
-        rim = on_table & (height > config.rim * lift)
-        floor = on_table & (height > -config.max_height)
-    normals = surface_normals(points, config.concave_edges)
-    sharp, crease = _creases(points, normals, frame.rgb, config.concave_edges)
-    jumps = depth_jumps(depth, frame.K, config.concave_edges)
-    boundary = np.maximum(crease, jumps)
-    # Across a jump nothing meets, however the surfaces on both sides lie.
-    meets = np.where(ndimage.binary_dilation(jumps, iterations=2), 0.0, sharp)
-    parts = find_parts(risen, boundary, config.components)
-    parts = join_parts(parts, boundary, config.border, config.components)
-    if config.concave_edges.faint < 1:
-        # A crease that only colour made strong parts what differs in colour as a whole.
-        sharp = np.maximum(sharp, jumps)
-        parts = join_alike(parts, sharp, frame.rgb, config.border, config.components)
-    parts = join_on_one_spot(parts, plan, height, table.plan(normals), meets, frame.rgb, config)
-    parts = split_stacks(parts, frame.rgb, height, config.stacks)
-    small = _areas(parts, frame) < config.min_area
-    segmap = absorb_small(parts, boundary, small)
+    seen = see_surfaces(frame, seed, config)
+    points, table = seen.points, seen.table
+    rises = rising(seen, config)
+    parted = part_objects(frame.rgb, seen, rises, config.affinities)
+    objects = parted.objects(config.affinities.alike)
+    objects = join_insides(
+        objects, seen.plan, seen.height, table.plan(seen.normals), config.insides
+    )
+    objects = split_stacks(objects, frame.rgb, seen.height, config.stacks)
+    small = _areas(objects, frame) < config.min_area
+    segmap = absorb_small(objects, parted.border, small)
     # Pixels at edges, which were left out of the smoothed depth, join what they lie next to.
-    edges = frame.valid & ~valid & (table.plane.signed_distance(frame.points) > config.rim * lift)
+    edges = frame.valid & ~seen.valid
+    edges &= table.plane.signed_distance(frame.points) > config.rim * rises.lift
     points = np.where(edges[..., None], frame.points, points)
-    segmap = grow(segmap, points, rim | edges, config.reach)
+    segmap = grow(segmap, points, rises.rim | edges, config.reach)
     # Specks would grow with their borders.
     segmap = _large(segmap, frame, config.min_area)
-    filled = fill_inside(segmap, table.plan(points), floor, config.concavities)
+    filled = fill_inside(segmap, table.plan(points), rises.floor, config.concavities)
     segmap = refine_borders(filled, frame.rgb, filled != segmap, config.borders)
     segmap = fill_holes(segmap, ~frame.valid)
     aside = np.zeros_like(segmap)
     if not keep_all:
         segmap, aside = _without(segmap, frame, table, config)
     return _numbered(segmap, frame, config.min_area), aside
-
-
-def _creases(
-    points: NDArray[np.floating],
-    normals: NDArray[np.floating],
-    rgb: NDArray[np.uint8],
-    config: ConcaveEdgesConfig,
-) -> tuple[NDArray[np.floating], NDArray[np.floating]]:
-    """Hollow creases (H, W), 0 to 1: sharp ones alone, and with faint ones where colour changes."""
-    angles = hollow_angles(points, normals, config)
-    sharp = strength(angles, config.flat, config.sharp)
-    if config.faint == 1:
-        return sharp, sharp
-    faint = strength(angles, config.faint * config.flat, config.faint * config.sharp)
-    return sharp, np.maximum(sharp, faint * colour_edges(rgb, config))
 
 
 def _without(
@@ -149,18 +95,6 @@ def _without(
         np.where(np.isin(segmap, list(reasons)), BACKGROUND, segmap),
         np.where(np.isin(segmap, in_the_air), segmap, BACKGROUND),
     )
-
-
-def _lift(
-    height: NDArray[np.float64], depth: NDArray[np.float64], config: SegmentConfig
-) -> NDArray[np.float64]:
-    """(H, W) metres above which something has risen from the table at its depth (H, W)."""
-    flat = np.abs(height) < config.max_height
-    scaled = height[flat] / depth[flat] ** 2
-    # The median of deviations, times what makes it the deviation of a normal distribution.
-    deviation = 1.4826 * float(np.median(np.abs(scaled - np.median(scaled)))) if flat.any() else 0.0
-    depth = np.nan_to_num(depth, nan=float(np.nanmedian(depth)))
-    return np.clip(config.sigmas * deviation * depth**2, config.min_height, config.max_height)
 
 
 def _areas(segmap: NDArray[np.int64], frame: Frame) -> NDArray[np.float64]:

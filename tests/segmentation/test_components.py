@@ -10,9 +10,8 @@ from brrp_cli.config.segmentation import (
     SmoothDepthConfig,
 )
 from brrp_cli.geometry import backproject
-from brrp_cli.segmentation.components import absorb_small, find_parts, join_alike, join_parts
+from brrp_cli.segmentation.components import absorb_small, find_parts
 from brrp_cli.segmentation.concave_edges import (
-    colour_edges,
     depth_jumps,
     hollow_creases,
     surface_normals,
@@ -81,18 +80,18 @@ def test_pixels_between_two_surfaces_fly_and_those_of_a_slope_do_not():
     assert not flying_pixels(1 / (1 + 0.004 * np.arange(80.0)) + np.zeros((60, 80)), SMOOTH).any()
 
 
-def test_parts_end_at_boundaries_and_necks_do_not_join_them():
+def test_parts_end_at_boundaries_and_at_necks():
     mask = np.zeros((20, 44), bool)
     mask[4:16, 2:18] = mask[4:16, 24:40] = True
     wall = np.zeros(mask.shape)
     mask[9:11, 18:24] = True
-    parts = join_parts(find_parts(mask, wall, PARTS), wall, 0.45, PARTS)
+    parts = find_parts(mask, wall, PARTS)
     assert parts[6, 6] != parts[6, 30]
     assert (parts[mask] > 0).all()
     mask[4:16, 18:24] = True
-    assert len(np.unique(join_parts(find_parts(mask, wall, PARTS), wall, 0.45, PARTS)[mask])) == 1
+    assert len(np.unique(find_parts(mask, wall, PARTS)[mask])) == 1
     wall[:, 20:22] = 1
-    parts = join_parts(find_parts(mask, wall, PARTS), wall, 0.45, PARTS)
+    parts = find_parts(mask, wall, PARTS)
     assert parts[6, 6] != parts[6, 30]
 
 
@@ -116,15 +115,3 @@ def test_holes_in_one_thing_are_filled_and_those_between_two_are_not():
     assert (filled[5:9, 5:9] == 1).all()
     assert (filled[5:9, 18:23] == 0).all()
     assert (filled[0:3, 30:33] == 0).all()
-
-
-def test_neighbours_of_one_colour_are_joined_and_those_of_two_are_not():
-    parts = np.repeat([[1] * 10 + [2] * 10 + [3] * 10], 20, axis=0)
-    rgb = np.full((20, 30, 3), 200, np.uint8)
-    rgb[:, 20:] = (200, 20, 20)
-    calm = np.zeros(parts.shape)
-    joined = join_alike(parts, calm, rgb, 0.45, PARTS)
-    assert np.array_equal(joined, np.where(parts == 3, 2, 1))
-    assert np.array_equal(join_alike(parts, calm + 1, rgb, 0.45, PARTS), parts)
-    edges = colour_edges(rgb, EDGES)
-    assert (edges[:, 18:22] == 1).all() and edges[:, :10].max() == 0

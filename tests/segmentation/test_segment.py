@@ -13,13 +13,11 @@ from brrp_cli.config.segmentation import (
     BordersConfig,
     ConcavitiesConfig,
     LeftOutConfig,
-    VividColourConfig,
 )
 from brrp_cli.errors import FrameError
 from brrp_cli.frames.build import make_frame
 from brrp_cli.segmentation.fill_concavities import fill_inside
 from brrp_cli.segmentation.left_out import EDGE, IN_THE_AIR, left_out
-from brrp_cli.segmentation.merge_by_colour import same_hue, vivid_hues
 from brrp_cli.segmentation.refine_borders import refine_borders
 from brrp_cli.segmentation.segment import segment, segment_and_aside
 from brrp_cli.shapes import solids
@@ -115,31 +113,6 @@ def test_things_that_touch_are_two(placed):
     for truth in (1, 2):
         best = max(overlap(found == i, frame.segmap == truth) for i in np.unique(found[found > 0]))
         assert best > 0.7, truth
-
-
-@pytest.mark.parametrize(("top", "count"), [((210, 170, 20), 1), ((150, 40, 160), 2)])
-def test_a_stud_of_its_bricks_colour_is_no_thing_of_its_own(top, count):
-    frame = boxes(((0.16, 0.14, 0.06), 0, 0, 0), ((0.07, 0.06, 0.07), 0, 0, 0.06))
-    rgb = np.full((*frame.shape, 3), 120, np.uint8)
-    rgb[frame.segmap == 1] = (220, 180, 30)
-    rgb[frame.segmap == 2] = top
-    assert segment(replace(frame, rgb=rgb)).max() == count
-
-
-def test_hues_are_of_vivid_parts_alone_and_go_round():
-    parts = np.repeat([0, 1, 2, 3, 4], 50).reshape(5, 50)
-    rgb = np.zeros((5, 50, 3), np.uint8)
-    rgb[1] = 90, 90, 100
-    rgb[2, ::2], rgb[2, 1::2] = (200, 0, 10), (200, 10, 0)
-    rgb[3, ::2], rgb[3, 1::2] = (200, 0, 0), (0, 0, 200)
-    rgb[4] = 10, 200, 10
-    colour = VividColourConfig()
-    hues = vivid_hues(parts, rgb, colour)
-    assert np.isnan(hues[[0, 1, 3]]).all()
-    assert same_hue(hues[2], 355.0, colour) and same_hue(hues[4], 120.0, VividColourConfig())
-    assert not same_hue(hues[2], hues[4], colour) and not same_hue(
-        hues[1], hues[1], VividColourConfig()
-    )
 
 
 def test_a_thin_thing_is_found():

@@ -1,4 +1,4 @@
-"""Parts of the image that stand on one spot of the table: the inside of a mug and its outside."""
+"""The inside of a mug and its outside, which stand on one spot of the table, are one thing."""
 
 from __future__ import annotations
 
@@ -7,16 +7,17 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from brrp_cli.config.segmentation import FootprintsConfig, SegmentConfig
+from brrp_cli.config.segmentation import FootprintsConfig
 from brrp_cli.dependencies import import_library
-from brrp_cli.segmentation.components import contacts, relabel
-from brrp_cli.segmentation.merge_by_colour import same_hue, vivid_hues
+from brrp_cli.segmentation.components import relabel
 from brrp_cli.segmentation.table_plane import convex_hull, in_hull
 
 Array = NDArray[np.floating]
 
 # No table has so many cells from its middle to its edge.
 _HALF = 2**24
+# Percentiles between which points tell the footprint.
+_MOST = (1, 99)
 
 
 @dataclass(frozen=True)
@@ -38,66 +39,50 @@ class Standing:
     high: float
 
 
-def join_on_one_spot(
+def join_insides(
     parts: NDArray[np.int64],
     plan: Array,
     height: Array,
     plan_normals: Array,
-    crease: Array,
-    rgb: NDArray[np.uint8],
-    config: SegmentConfig,
+    config: FootprintsConfig,
 ) -> NDArray[np.int64]:
-    """Labels (H, W) in which parts that belong together, though something lies between them in the
-    image, have one label.
-
-    Parts that meet in a hollow crease are two things, unless the upper one neither stands on the
-    table nor lies over the lower one: a handle, the body of a drill. Of parts that do not, whose
-    footprints share `config.overlap` of the smaller one, one may be the inside of the other: it
-    faces the other's middle, as the far wall of a mug does. Or both are pieces of one thing, at one
-    height. Parts of one vivid colour that share some of their footprints are one thing however they
-    meet: the studs of a brick.
+    """Labels (H, W) in which the inside of a hollow thing, as is seen from above, has its outside's
+    label: it faces the middle of both, as the far wall of a mug does, and lies over the outside's
+    footprint, or is round with it.
 
     plan : (H, W, 2) plan coordinates, height : (H, W) above the table, metres; plan_normals :
-    (H, W, 2) the normals' part in the plan; crease : (H, W) hollow creases that are no jumps of
-    depth, 0 to 1; rgb : (H, W, 3)
+    (H, W, 2) the normals' part in the plan
     """
-    own = config.footprints
     count = int(parts.max()) + 1
     ndimage = import_library("scipy.ndimage")
     standing = {
         i: _standing(
-            parts[window] == i, plan[window], height[window], plan_normals[window], own.cell
+            parts[window] == i, plan[window], height[window], plan_normals[window], config.cell
         )
         for i, window in enumerate(ndimage.find_objects(parts), start=1)
         if window is not None
     }
-    touch = contacts(parts, crease, config.components)
-    hues = vivid_hues(parts, rgb, config.vivid_colour)
     same = np.zeros((count, count), dtype=bool)
     for i, first in standing.items():
         for j, second in standing.items():
-            if j >= i:
-                continue
-            if _apart(first, second):
+            if j >= i or _apart(first, second):
                 continue
             both = np.intersect1d(first.cells, second.cells, assume_unique=True)
             shared = len(both) / min(len(first.cells), len(second.cells))
-            if touch[i, j]:
-                pieces = shared > own.over and _hangs(first, second, own)
-            else:
-                pieces = shared > own.pieces and _at_one_height(first, second, own)
-            inward = max(_inward(first, second, own), _inward(second, first, own))
-            inside = inward > own.inward and shared > config.overlap
-            coloured = shared > own.coloured and same_hue(hues[i], hues[j], config.vivid_colour)
-            walls = _walls(first, second, own) or _walls(second, first, own)
-            same[i, j] = pieces or inside or coloured or walls
+            inward = max(_inward(first, second, config), _inward(second, first, config))
+            inside = inward > config.inward and shared > config.overlap
+            walls = _walls(first, second, config) or _walls(second, first, config)
+            same[i, j] = inside or walls
     return relabel(parts, same)
 
 
 def _standing(
     mask: NDArray[np.bool_], plan: Array, height: Array, normals: Array, cell: float
 ) -> Standing:
-    cells = _filled(_places(np.unique(_codes(np.floor(plan[mask] / cell).astype(np.int64)))))
+    # Bled pixels lie far behind, and would be most of the hull.
+    low, high = np.percentile(plan[mask], _MOST, axis=0)
+    inner = plan[mask][((plan[mask] >= low) & (plan[mask] <= high)).all(axis=-1)]
+    cells = _filled(_places(np.unique(_codes(np.floor(inner / cell).astype(np.int64)))))
     bottom, top = np.percentile(height[mask], (5, 95))
     known = mask & np.isfinite(normals[..., 0])
     return Standing(
@@ -169,15 +154,3 @@ def _walls(far: Standing, near: Standing, config: FootprintsConfig) -> bool:
         and _inward(near, far, config) < -config.facing
         and _gap(far, near) < config.round
     )
-
-
-def _hangs(first: Standing, second: Standing, config: FootprintsConfig) -> bool:
-    """Whether the upper of two that touch neither stands on the table nor lies on the lower."""
-    lower, upper = (first, second) if first.low < second.low else (second, first)
-    middle = _codes(np.floor(upper.middle / config.cell).astype(np.int64))
-    return upper.low > config.stands and not np.isin(middle, lower.cells)
-
-
-def _at_one_height(first: Standing, second: Standing, config: FootprintsConfig) -> bool:
-    shared = min(first.high, second.high) - max(first.low, second.low)
-    return shared > config.same_range * min(first.high - first.low, second.high - second.low)

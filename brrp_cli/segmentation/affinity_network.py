@@ -1,0 +1,89 @@
+"""A network that says of two pixels near each other whether they show one object: a small U-Net.
+
+It gives an affinity for each pixel and the one that lies `OFFSETS` from it, near and far (Wolf et
+al., "The Mutex Watershed", ECCV 2018): near ones are borders, far ones say what belongs together
+beyond a border that prints, shadows or waves of depth have drawn.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import torch
+from torch import Tensor, nn
+from torch.nn.functional import interpolate, pad
+
+from brrp_cli.segmentation.image_channels import CHANNELS
+
+# Rows and columns from a pixel to its partner, in pixels of the smaller image.
+REACHES = (2, 6, 16)
+DIRECTIONS = ((0, 1), (1, 0), (1, 1), (1, -1))
+OFFSETS = tuple((reach * down, reach * right) for reach in REACHES for down, right in DIRECTIONS)
+# A pixel of the coarsest level, in those of the image, which is padded to a multiple of it.
+_MULTIPLE = 16
+
+
+@dataclass(frozen=True)
+class AffinityNetworkConfig:
+    """widths : channels at full size, and at a half, a quarter, an eighth and a sixteenth of it"""
+
+    widths: tuple[int, int, int, int, int] = (16, 32, 48, 72, 96)
+
+
+class AffinityNetwork(nn.Module):
+    """Logits (B, len(OFFSETS) + 1, h, w) from channels (B, CHANNELS, h, w): affinities, and at last
+    that the pixel shows an object."""
+
+    def __init__(self, config: AffinityNetworkConfig) -> None:
+        super().__init__()
+        self.config = config
+        full, *others = config.widths
+        self.fine = nn.Sequential(nn.Conv2d(CHANNELS, full, 3, padding=1), Block(full))
+        self.down = nn.ModuleList(
+            nn.Sequential(nn.Conv2d(wide, narrow, 2, stride=2), Block(narrow), Block(narrow))
+            for wide, narrow in zip(config.widths, others, strict=False)
+        )
+        self.join = nn.ModuleList(
+            Join(narrow, wide) for wide, narrow in zip(config.widths, others, strict=False)
+        )
+        self.up = nn.ModuleList(Block(wide) for wide in config.widths[:-1])
+        self.out = nn.Conv2d(full, len(OFFSETS) + 1, 3, padding=1)
+
+    def forward(self, values: Tensor) -> Tensor:
+        """The logits of images."""
+        height, width = values.shape[2:]
+        levels = [self.fine(pad(values, (0, -width % _MULTIPLE, 0, -height % _MULTIPLE)))]
+        for down in self.down:
+            levels.append(down(levels[-1]))
+        found = levels.pop()
+        for join, up in zip(reversed(self.join), reversed(self.up), strict=True):
+            found = up(join(found, levels.pop()))
+        logits: Tensor = self.out(found)
+        return logits[..., :height, :width]
+
+
+class Block(nn.Module):
+    """x + relu(norm(convolution(x)))."""
+
+    def __init__(self, channels: int) -> None:
+        super().__init__()
+        self.convolution = nn.Conv2d(channels, channels, 3, padding=1)
+        self.norm = nn.GroupNorm(4, channels)
+
+    def forward(self, x: Tensor) -> Tensor:
+        """As many channels as before."""
+        return x + torch.relu(self.norm(self.convolution(x)))
+
+
+class Join(nn.Module):
+    """The coarse level brought to the resolution of the fine one, and added to it."""
+
+    def __init__(self, coarse: int, fine: int) -> None:
+        super().__init__()
+        self.coarse = nn.Conv2d(coarse, fine, 1)
+        self.fine = nn.Conv2d(fine, fine, 1, bias=False)
+
+    def forward(self, coarse: Tensor, fine: Tensor) -> Tensor:
+        """(B, fine, h, w) from (B, coarse, h / 2, w / 2) and (B, fine, h, w)."""
+        up = interpolate(self.coarse(coarse), scale_factor=2, mode="nearest")
+        return self.fine(fine) + up

@@ -1,0 +1,82 @@
+"""Parts that the affinities of their pixels join: average linkage, the most alike first.
+
+Average linkage of signed graphs is one of the agglomerations of Bailoni et al., "GASP, a
+generalized framework for agglomerative clustering of signed graphs" (CVPR 2022): one wrong border
+among many right ones changes a mean by little.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brrp_cli.segmentation.components import relabel
+from brrp_cli.segmentation.learned_affinities import Affinities
+from brrp_cli.segmentation.pixel_pairs import windows
+
+
+def borders_of(affinities: Affinities) -> NDArray[np.float64]:
+    """(h, w) 0 to 1, how surely one thing ends at a pixel: of the nearest partners alone."""
+    reach = [max(abs(down), abs(right)) for down, right in affinities.offsets]
+    border = np.zeros(affinities.object.shape)
+    for same, offset, far in zip(affinities.same, affinities.offsets, reach, strict=True):
+        if far == min(reach):
+            pixel, _ = windows(offset, border.shape)
+            middle = tuple(
+                slice(cut.start + step // 2, cut.stop + step // 2)
+                for cut, step in zip(pixel, offset, strict=True)
+            )
+            border[middle] = np.maximum(border[middle], 1 - same[pixel])
+    return border
+
+
+@dataclass(frozen=True)
+class Join:
+    """Two parts, each with what joined it before, that become one, the `first`; affinity : mean of
+    their pixels'"""
+
+    first: int
+    second: int
+    affinity: float
+
+
+def joins_of(parts: NDArray[np.int64], affinities: Affinities, least: float) -> list[Join]:
+    """How labels (h, w) become fewer, two at a time, those whose pixels have the highest mean
+    affinity first, as long as it is over `least`."""
+    count = int(parts.max()) + 1
+    total, pairs = np.zeros((2, count * count))
+    for same, offset in zip(affinities.same, affinities.offsets, strict=True):
+        pixel, partner = windows(offset, parts.shape)
+        first, second = parts[pixel], parts[partner]
+        asked = (first > 0) & (second > 0) & (first != second)
+        codes = first[asked] * count + second[asked]
+        total += np.bincount(codes, same[pixel][asked], count * count)
+        pairs += np.bincount(codes, minlength=count * count)
+    sums, numbers = total.reshape(count, count), pairs.reshape(count, count)
+    return _linked(sums + sums.T, numbers + numbers.T, least)
+
+
+def _linked(total: NDArray[np.float64], pairs: NDArray[np.float64], least: float) -> list[Join]:
+    """Average linkage. total : (n, n) sums of the affinities of `pairs` (n, n); both are used up"""
+    joins: list[Join] = []
+    while True:
+        mean = np.divide(total, pairs, out=np.zeros_like(total), where=pairs > 0)
+        first, second = (int(i) for i in np.unravel_index(np.argmax(mean), mean.shape))
+        if mean[first, second] <= least:
+            return joins
+        joins.append(Join(first, second, float(mean[first, second])))
+        for table in (total, pairs):
+            table[first] += table[second]
+            table[:, first] += table[:, second]
+            table[second] = table[:, second] = table[first, first] = 0
+
+
+def joined(parts: NDArray[np.int64], joins: Iterable[Join]) -> NDArray[np.int64]:
+    """Labels (h, w) after those joins, 1, 2, ..."""
+    same = np.zeros((int(parts.max()) + 1,) * 2, dtype=bool)
+    for join in joins:
+        same[join.first, join.second] = True
+    return relabel(parts, same)

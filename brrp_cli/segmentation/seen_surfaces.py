@@ -1,0 +1,78 @@
+"""What masks are made from: smoothed depth, its normals and edges, and the table under it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brrp_cli.config.segmentation import SegmentConfig
+from brrp_cli.errors import FrameError
+from brrp_cli.frames.frame import Frame
+from brrp_cli.geometry import backproject
+from brrp_cli.segmentation.concave_edges import depth_jumps, hollow_angles, surface_normals
+from brrp_cli.segmentation.smooth_depth import flying_pixels, smooth_depth
+from brrp_cli.segmentation.table_plane import Table, find_table
+
+Array = NDArray[np.floating]
+
+# Of the image, that must have depth which agrees with its neighbours'.
+MIN_SHARE = 0.01
+
+
+@dataclass(frozen=True)
+class SeenSurfaces:
+    """What a frame shows, after depth was smoothed and flying pixels were left out.
+
+    depth : (H, W) metres, NaN = none; points : (H, W, 3) metres, camera frame; valid : (H, W)
+    height : (H, W) metres above the table; plan : (H, W, 2) metres, on it
+    normals : (H, W, 3) unit, toward the camera; angles : (H, W) degrees of hollow creases; jumps :
+    (H, W) pixels beside which depth jumps
+    """
+
+    depth: NDArray[np.float64]
+    points: Array
+    valid: NDArray[np.bool_]
+    table: Table
+    height: NDArray[np.float64]
+    plan: NDArray[np.float64]
+    normals: Array
+    angles: Array
+    jumps: NDArray[np.bool_]
+
+
+def see_surfaces(frame: Frame, seed: int, config: SegmentConfig) -> SeenSurfaces:
+    """What `frame` shows. Errors: FrameError if it has too little depth, or no table."""
+    depth = smoothed(frame, config)
+    points = backproject(depth, frame.K)
+    valid = np.isfinite(depth)
+    if valid.sum() < MIN_SHARE * valid.size:
+        raise FrameError(
+            "Too little depth to find objects in",
+            where=frame.source,
+            expected=f"depth that neighbours agree on, at {MIN_SHARE:.0%} of the pixels or more",
+            found=f"{int(frame.valid.sum())} of {valid.size} pixels have depth,"
+            f" {int(valid.sum())} of them agree with their neighbours",
+            fix="check the depth image and its unit; masks made elsewhere go in by --masks",
+        )
+    table = find_table(points[valid], seed, frame.source, config.table)
+    normals = surface_normals(points, config.concave_edges)
+    return SeenSurfaces(
+        depth,
+        points,
+        valid,
+        table,
+        table.plane.signed_distance(points),
+        table.plan(points),
+        normals,
+        hollow_angles(points, normals, config.concave_edges),
+        depth_jumps(depth, frame.K, config.concave_edges),
+    )
+
+
+def smoothed(frame: Frame, config: SegmentConfig) -> NDArray[np.float64]:
+    """Depth (H, W), metres, without flying pixels and averaged over each surface; NaN = none."""
+    raw = np.where(frame.valid, frame.points[..., 2], np.nan)
+    flying = flying_pixels(raw, config.smooth_depth)
+    return smooth_depth(np.where(flying, np.nan, raw), config.smooth_depth)

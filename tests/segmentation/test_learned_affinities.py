@@ -1,0 +1,84 @@
+"""The network that parts objects: its file, and what it says of images of any size."""
+
+import numpy as np
+import pytest
+import torch
+from safetensors.torch import save_file
+
+from brrp_cli.config.segmentation import SegmentConfig
+from brrp_cli.errors import WeightsError
+from brrp_cli.frames.build import make_frame
+from brrp_cli.segmentation.affinity_network import AffinityNetwork, AffinityNetworkConfig
+from brrp_cli.segmentation.learned_affinities import (
+    Affinities,
+    affinities_of,
+    load_affinity_network,
+    save_affinity_network,
+    shipped,
+)
+from brrp_cli.segmentation.seen_surfaces import see_surfaces
+
+
+def tiny():
+    torch.manual_seed(0)
+    return AffinityNetwork(AffinityNetworkConfig((4, 4, 8, 8, 8))).eval()
+
+
+def test_a_file_gives_the_network_back(tmp_path, scene):
+    frame = make_frame(rgb=scene.rgb, depth=scene.depth, K=scene.K)
+    seen = see_surfaces(frame, 0, SegmentConfig())
+    network, path = tiny(), tmp_path / "affinities.safetensors"
+    save_affinity_network(network, {"views": 1}, path)
+    before = affinities_of(frame.rgb, seen, network)
+    after = affinities_of(frame.rgb, seen, load_affinity_network(path))
+    np.testing.assert_allclose(before.same, after.same, atol=0.01)
+    assert before.object.shape == frame.shape and before.step == 1
+    assert ((before.same > 0) & (before.same < 1)).all()
+
+
+@pytest.mark.parametrize("bad", ["nothing", "no weights", "another format"])
+def test_a_file_that_cannot_be_used_is_named(tmp_path, bad):
+    path = tmp_path / "affinities.safetensors"
+    if bad == "no weights":
+        path.write_bytes(b"\x00" * 100)
+    elif bad == "another format":
+        save_file({"x": torch.zeros(2)}, path, metadata={"format": "brrp completion 1"})
+    with pytest.raises(WeightsError, match="network that parts objects cannot be read") as raised:
+        load_affinity_network(path)
+    assert str(path) in str(raised.value)
+
+
+def test_the_smaller_image_and_that_of_the_camera_lie_on_each_other():
+    rows, columns = np.indices((7, 11))
+    nothing = np.zeros((3, 5), np.float32)
+    affinities = Affinities(nothing[None], nothing, ((0, 2),), (7, 11), 2)
+    assert np.array_equal(affinities.sample(rows)[:, 0], [1, 3, 5])
+    assert np.array_equal(affinities.sample(columns)[0], [1, 3, 5, 7, 9])
+    assert np.array_equal(affinities.sample(affinities.enlarge(nothing + 3)), nothing + 3)
+    large = affinities.enlarge(np.arange(15).reshape(3, 5) + 1)
+    assert large.shape == (7, 11) and not large[6].any() and not large[:, 10].any()
+    assert (large[2:4, 4:6] == 8).all()
+
+
+@pytest.mark.parametrize("colour", [0.0, 1.0])
+def test_the_shipped_network_knows_objects_from_the_table(scene, colour):
+    frame = make_frame(rgb=scene.rgb, depth=scene.depth, K=scene.K)
+    seen = see_surfaces(frame, 0, SegmentConfig())
+    found = affinities_of(frame.rgb, seen, shipped(), colour).object
+    # Behind the table stands a wall.
+    table = (scene.segmap == 0) & (np.nan_to_num(scene.depth, nan=9) < 1.1)
+    assert np.median(found[scene.segmap != 0]) > 0.9
+    assert np.median(found[table]) < 0.1
+
+
+def test_without_colour_no_colour_changes_what_the_network_says(scene):
+    seen = see_surfaces(make_frame(depth=scene.depth, K=scene.K), 0, SegmentConfig())
+    rng = np.random.default_rng(0)
+    first, second = (
+        affinities_of(rgb, seen, shipped(), 0.0)
+        for rgb in (scene.rgb, rng.integers(0, 255, scene.rgb.shape).astype(np.uint8))
+    )
+    assert np.array_equal(first.same, second.same)
+    both = affinities_of(scene.rgb, seen, shipped(), 0.5)
+    alone = affinities_of(scene.rgb, seen, shipped(), 1.0)
+    np.testing.assert_allclose(both.same, (first.same + alone.same) / 2, atol=1e-6)

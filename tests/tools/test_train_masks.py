@@ -1,0 +1,133 @@
+"""The command that trains the network of masks, on two small scenes, as people run it."""
+
+import json
+import shutil
+
+import numpy as np
+import pytest
+import torch
+from click.testing import CliRunner
+from tiny_scenes import write_meshes, write_scene
+from train_masks import main
+from training.mask_batches import draw_batch
+from training.mask_examples import Examples, is_held, read_examples
+from training.masks import loss_of
+
+from brrp_cli.segmentation.affinity_network import OFFSETS
+from brrp_cli.segmentation.image_channels import CHANNELS, SIDEWAYS
+from brrp_cli.segmentation.learned_affinities import load_affinity_network
+from brrp_cli.segmentation.pixel_pairs import windows
+
+# With this seed one of both scenes is kept to validate.
+SMALL = ["--views", 1, "--cooling", 0, "--batch", 1, "--workers", 1, "--seed", 3]
+HELD = ["--validation", 0.5]
+
+
+def run(*arguments):
+    result = CliRunner().invoke(main, [*map(str, arguments)])
+    if result.exception is not None and not isinstance(result.exception, SystemExit):
+        raise result.exception
+    return result
+
+
+@pytest.fixture(scope="module")
+def place(tmp_path_factory):
+    """Scenes, and a folder with their examples."""
+    folder = tmp_path_factory.mktemp("masks")
+    write_meshes(folder / "shapes")
+    for number in range(3):
+        write_scene(
+            folder / "scenes" / f"{number:08d}",
+            {1: ("can", 0.07, 0.0), 2: ("ball", -0.08, 0.02)},
+            yaw=float(number),
+        )
+    scenes = f"{folder / 'scenes'}:measured"
+    result = run(scenes, "-o", folder / "made", *SMALL, "--examples-only")
+    assert result.exit_code == 0, result.output
+    return folder
+
+
+def examples_of(place):
+    return read_examples(sorted((place / "made" / "examples").glob("*/*.npz")))
+
+
+def history(folder):
+    records = json.loads((folder / "history.json").read_text())
+    return [{k: v for k, v in record.items() if k != "seconds"} for record in records]
+
+
+def test_examples_have_the_true_labels(place):
+    found = examples_of(place)
+    assert len(found) == 3
+    assert np.unique(found.labels).tolist() == [0, 1, 2]
+    height = found.channels[:, 3]
+    assert height[found.labels > 0].mean() > 10 > 2 > abs(np.median(height[found.labels == 0]))
+
+
+def test_the_loss_is_nothing_where_all_is_right_and_one_pair_too_many_costs():
+    labels = torch.ones(1, 32, 40, dtype=torch.int64)
+    labels[:, :, 20:] = 2
+    labels[:, :4] = 0
+    logits = torch.zeros(1, len(OFFSETS) + 1, 32, 40)
+    logits[0, -1] = torch.where(labels[0] > 0, 20.0, -20.0)
+    for index, offset in enumerate(OFFSETS):
+        pixel, partner = windows(offset, (32, 40))
+        same = labels[0][pixel] == labels[0][partner]
+        logits[0, index][pixel] = torch.where(same, 20.0, -20.0)
+    assert float(loss_of(logits, labels)) < 1e-6
+    # What is said of the table itself is not asked for.
+    other = logits.clone()
+    other[0, 0, :3] *= -1
+    assert float(loss_of(other, labels)) < 1e-6
+    other[0, 0, 10, 19] *= -1
+    assert float(loss_of(other, labels)) > 1e-3
+
+
+def test_batches_turn_labels_with_their_images():
+    labels = np.zeros((1, 64, 64), np.uint8)
+    labels[:, 10:30, 5:20] = 3
+    channels = np.zeros((1, CHANNELS, 64, 64), np.int8)
+    channels[:, 3][labels > 0] = 63
+    channels[:, SIDEWAYS][labels > 0] = 63
+    examples = Examples(channels, labels, ("one",))
+    signs = set()
+    for seed in range(8):
+        found, asked = draw_batch(examples, np.array([0]), (48, 48), np.random.default_rng(seed))
+        assert asked.shape == (1, 48, 48) and set(np.unique(asked)) <= {0, 3}
+        seen = found[0, 3] > 0
+        assert not (seen & (asked[0] == 0)).any()  # holes alone differ
+        signs |= set(np.sign(found[0, SIDEWAYS][seen].numpy()))
+        assert float(found[0, :3].abs().max()) <= 1
+    assert signs == {-1.0, 1.0}
+
+
+def test_views_of_a_scene_are_kept_together(tmp_path):
+    paths = [
+        tmp_path / "set" / f"{scene:08d}_{view}.npz" for scene in range(300) for view in (0, 1)
+    ]
+    held = [is_held(path, 0.1, 0) for path in paths]
+    assert held[::2] == held[1::2] and 10 < sum(held) / 2 < 60
+
+
+def test_trains_and_goes_on_as_if_it_had_not_stopped(place, tmp_path):
+    whole, parted = tmp_path / "whole", tmp_path / "parted"
+    for folder in (whole, parted):
+        shutil.copytree(place / "made", folder)
+    result = run("-o", whole, "--epochs", 2, *SMALL, *HELD)
+    assert result.exit_code == 0, result.output
+    assert "the same command goes on" in run("-o", parted, *SMALL, *HELD, "--minutes", 0).output
+    assert run("-o", parted, "--epochs", 1, *SMALL, *HELD).exit_code == 0
+    assert "Going on after epoch 1" in run("-o", parted, "--epochs", 2, *SMALL, *HELD).output
+    assert history(parted) == history(whole)
+    one, two = (load_affinity_network(f / "affinities.safetensors") for f in (whole, parted))
+    for a, b in zip(one.state_dict().values(), two.state_dict().values(), strict=True):
+        assert torch.equal(a, b)
+    refused = run("-o", parted, "--epochs", 2, *SMALL, *HELD, "--rate", 0.1)
+    assert refused.exit_code == 1 and "holds another training" in refused.output
+
+
+def test_tells_what_is_missing_and_what_is_not_understood(tmp_path):
+    result = run("-o", tmp_path / "out")
+    assert result.exit_code == 1 and "too little to train on" in result.output
+    result = run("scenes:masured", "-o", tmp_path)
+    assert result.exit_code == 1 and "masured" in result.output and "measured" in result.output
