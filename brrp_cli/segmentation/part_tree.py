@@ -25,7 +25,10 @@ def parts_of(frame: Frame, seed: int, config: SegmentConfig) -> Parted | None:
         seen = see_surfaces(frame, seed, config)
     except FrameError:
         return None
-    return part_objects(frame.rgb, seen, rising(seen, config), config.affinities)
+    import os
+    from dataclasses import replace
+    aff = replace(config.affinities, colour=float(os.environ.get("TC", "1")))
+    return part_objects(frame.rgb, seen, rising(seen, config), aff)
 
 
 def nearly_joined(
