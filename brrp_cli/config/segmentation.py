@@ -93,15 +93,13 @@ class AffinitiesConfig:
     colour : what the network says when it sees colours counts so much, and the rest what it says
         without: real prints and shadows are stranger to it than real depth
     least : that a pixel shows an object, or it is depth that bled
-    alike : mean affinity of the pixels of two parts from which on they are one object; doubtful :
-        from which on a stored object may show that they are
+    alike : mean affinity of the pixels of two parts from which on they are one object
     components : the parts that are joined, in pixels of the network's image
     """
 
     colour: float = share(0.5)
     least: float = share(0.1)
     alike: float = share(0.4)
-    doubtful: float = share(0.1)
     components: ComponentsConfig = field(default_factory=lambda: ComponentsConfig(least_core=8))
 
 

@@ -7,9 +7,6 @@ among many right ones changes a mean by little.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -33,19 +30,11 @@ def borders_of(affinities: Affinities) -> NDArray[np.float64]:
     return border
 
 
-@dataclass(frozen=True)
-class Join:
-    """Two parts, each with what joined it before, that become one, the `first`; affinity : mean of
-    their pixels'"""
-
-    first: int
-    second: int
-    affinity: float
-
-
-def joins_of(parts: NDArray[np.int64], affinities: Affinities, least: float) -> list[Join]:
-    """How labels (h, w) become fewer, two at a time, those whose pixels have the highest mean
-    affinity first, as long as it is over `least`."""
+def join_alike_pixels(
+    parts: NDArray[np.int64], affinities: Affinities, least: float
+) -> NDArray[np.int64]:
+    """Labels (h, w) after parts were joined, two at a time, those first whose pixels have the
+    highest mean affinity, as long as it is over `least`."""
     count = int(parts.max()) + 1
     total, pairs = np.zeros((2, count * count))
     for same, offset in zip(affinities.same, affinities.offsets, strict=True):
@@ -56,27 +45,22 @@ def joins_of(parts: NDArray[np.int64], affinities: Affinities, least: float) -> 
         total += np.bincount(codes, same[pixel][asked], count * count)
         pairs += np.bincount(codes, minlength=count * count)
     sums, numbers = total.reshape(count, count), pairs.reshape(count, count)
-    return _linked(sums + sums.T, numbers + numbers.T, least)
+    return relabel(parts, _linked(sums + sums.T, numbers + numbers.T, least))
 
 
-def _linked(total: NDArray[np.float64], pairs: NDArray[np.float64], least: float) -> list[Join]:
-    """Average linkage. total : (n, n) sums of the affinities of `pairs` (n, n); both are used up"""
-    joins: list[Join] = []
+def _linked(
+    total: NDArray[np.float64], pairs: NDArray[np.float64], least: float
+) -> NDArray[np.bool_]:
+    """(n, n) which parts are joined. total : (n, n) sums of the affinities of `pairs` (n, n); both
+    are used up"""
+    joined = np.zeros(total.shape, dtype=bool)
     while True:
         mean = np.divide(total, pairs, out=np.zeros_like(total), where=pairs > 0)
-        first, second = (int(i) for i in np.unravel_index(np.argmax(mean), mean.shape))
+        first, second = np.unravel_index(np.argmax(mean), mean.shape)
         if mean[first, second] <= least:
-            return joins
-        joins.append(Join(first, second, float(mean[first, second])))
+            return joined
+        joined[first, second] = True
         for table in (total, pairs):
             table[first] += table[second]
             table[:, first] += table[:, second]
             table[second] = table[:, second] = table[first, first] = 0
-
-
-def joined(parts: NDArray[np.int64], joins: Iterable[Join]) -> NDArray[np.int64]:
-    """Labels (h, w) after those joins, 1, 2, ..."""
-    same = np.zeros((int(parts.max()) + 1,) * 2, dtype=bool)
-    for join in joins:
-        same[join.first, join.second] = True
-    return relabel(parts, same)

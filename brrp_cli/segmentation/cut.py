@@ -10,10 +10,10 @@ from brrp_cli.dependencies import import_library
 from brrp_cli.errors import FrameError
 from brrp_cli.frames.frame import Frame
 from brrp_cli.geometry import backproject
+from brrp_cli.segmentation.agglomerate import borders_of
 from brrp_cli.segmentation.components import find_parts, split_at_strongest
 from brrp_cli.segmentation.concave_edges import depth_jumps, hollow_creases, surface_normals
-from brrp_cli.segmentation.part_objects import part_objects
-from brrp_cli.segmentation.rising import rising
+from brrp_cli.segmentation.learned_affinities import affinities_of, shipped
 from brrp_cli.segmentation.seen_surfaces import see_surfaces, smoothed
 
 
@@ -24,8 +24,8 @@ def boundary_of(frame: Frame, config: SegmentConfig) -> NDArray[np.float64]:
         seen = see_surfaces(frame, 0, config)
     except FrameError:
         return _without_a_table(frame, config)
-    parted = part_objects(frame.rgb, seen, rising(seen, config), config.affinities)
-    return np.maximum(parted.border, seen.jumps)
+    affinities = affinities_of(frame.rgb, seen, shipped(), config.affinities.colour)
+    return np.maximum(affinities.enlarge(borders_of(affinities)), seen.jumps)
 
 
 def _without_a_table(frame: Frame, config: SegmentConfig) -> NDArray[np.float64]:

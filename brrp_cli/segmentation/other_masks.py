@@ -19,7 +19,6 @@ from brrp_cli.dependencies import import_library
 from brrp_cli.frames.frame import BACKGROUND, Frame
 from brrp_cli.seeds import child_rng
 from brrp_cli.segmentation.cut import boundary_of, cut_at_strongest, filled
-from brrp_cli.segmentation.part_tree import nearly_apart, nearly_joined, parts_of
 
 Mask = NDArray[np.bool_]
 
@@ -48,25 +47,12 @@ def other_masks(
     """
     own = config.regroup
     found = [] if aside is None else _left_out(frame, aside)
-    import os
-
-    mode = os.environ.get("TREE", "")
-    groups = unions(frame, ids, own)
-    parted = parts_of(frame, seed, config) if mode else None
-    if parted is not None:
-        near = nearly_joined(parted, frame.segmap, ids)
-        groups = near + [g for g in groups if g not in near and "u" not in mode]
-    found += [OtherMask(np.isin(frame.segmap, list(of)), of) for of in groups]
+    found += [OtherMask(np.isin(frame.segmap, list(of)), of) for of in unions(frame, ids, own)]
     large = [i for i in ids if i not in whole and _size(frame, frame.segmap == i) >= own.least_cut]
     if large:
         boundary = boundary_of(frame, config)
         for i in large:
             rng = child_rng(seed, "colour groups", i)
-            if parted is not None:
-                sides = nearly_apart(parted, frame.segmap, i, 3)
-                found += [OtherMask(m, frozenset([i])) for m in sides]
-                if "c" in mode:
-                    continue
             found += [
                 OtherMask(part, frozenset([i])) for part in parts(frame, i, boundary, config, rng)
             ]
@@ -160,7 +146,8 @@ def parts(
         pieces += [
             each
             for each in _pieces(labels, mask)
-            if np.linalg.norm(lab[each].mean(axis=0) - lab[mask & ~each].mean(axis=0)) > own.differs
+            if (rest := mask & ~each).any()
+            and np.linalg.norm(lab[each].mean(axis=0) - lab[rest].mean(axis=0)) > own.differs
         ]
     found: list[Mask] = []
     for piece in pieces:

@@ -55,10 +55,9 @@ def segment_and_aside(
     seen = see_surfaces(frame, seed, config)
     points, table = seen.points, seen.table
     rises = rising(seen, config)
-    parted = part_objects(frame.rgb, seen, rises, config.affinities)
-    objects = parted.objects(config.affinities.alike)
+    parted = part_objects(frame.rgb, seen, rises.risen, config.affinities)
     objects = join_insides(
-        objects, seen.plan, seen.height, table.plan(seen.normals), config.insides
+        parted.labels, seen.plan, seen.height, table.plan(seen.normals), config.insides
     )
     objects = split_stacks(objects, frame.rgb, seen.height, config.stacks)
     small = _areas(objects, frame) < config.min_area

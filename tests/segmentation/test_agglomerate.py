@@ -4,15 +4,11 @@ import numpy as np
 import pytest
 
 from brrp_cli.segmentation.affinity_network import OFFSETS
-from brrp_cli.segmentation.agglomerate import borders_of, joined, joins_of
+from brrp_cli.segmentation.agglomerate import borders_of, join_alike_pixels
 from brrp_cli.segmentation.learned_affinities import Affinities
 from brrp_cli.segmentation.pixel_pairs import windows
 
 SHAPE = (20, 60)
-
-
-def join_alike_pixels(parts, affinities, least):
-    return joined(parts, joins_of(parts, affinities, least))
 
 
 def told(objects, sure=0.9):
