@@ -99,7 +99,7 @@ class AffinitiesConfig:
 
     colour: float = share(0.5)
     least: float = share(0.1)
-    alike: float = share(0.4)
+    alike: float = share(0.3)
     components: ComponentsConfig = field(default_factory=lambda: ComponentsConfig(least_core=8))
 
 
