@@ -18,8 +18,11 @@ from numpy.typing import NDArray
 from brrp_cli.network_files import load_network, save_network
 from brrp_cli.segmentation.image_channels import COLOURS, image_channels, step_of
 from brrp_cli.segmentation.seen_surfaces import SeenSurfaces
+from brrp_cli.threads import cores, in_threads
 
 if TYPE_CHECKING:
+    from torch import Tensor
+
     from brrp_cli.segmentation.affinity_network import AffinityNetwork
 
 FORMAT = "brrp affinities 1"
@@ -72,10 +75,14 @@ def affinities_of(
     values = torch.from_numpy(image_channels(rgb, seen)).float() / 63
     blind = values.clone()
     blind[COLOURS] = 0
-    looks = [(values, colour), (blind, 1 - colour)]
-    with torch.no_grad():
-        said = [w * torch.sigmoid(network(look[None])[0]) for look, w in looks if w > 0]
-    found = torch.stack(said).sum(dim=0).numpy()
+    looks = [(look, w) for look, w in ((values, colour), (blind, 1 - colour)) if w > 0]
+
+    def say(look: tuple[Tensor, float]) -> Tensor:
+        with torch.no_grad():
+            return look[1] * torch.sigmoid(network(look[0][None])[0])
+
+    # A thread for each: torch's own would change the last bits.
+    found = torch.stack(list(in_threads(say, looks, cores()))).sum(dim=0).numpy()
     shape = rgb.shape[0], rgb.shape[1]
     return Affinities(found[:-1], found[-1], OFFSETS, shape, step_of(shape))
 
