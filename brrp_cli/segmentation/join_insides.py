@@ -25,17 +25,14 @@ class Standing:
     """One part as it stands.
 
     cells : (n,) of the plan, in the hull of its footprint, as `_codes`, ascending; box : the lowest
-    and highest of them, (2,) each;
-    middle : theirs, metres; plan, normals : (n, 2) its points and their normals in the plan;
-    low, high : heights between which nine tenths of it lie, metres
+    and highest of them, (2,) each; plan, normals : (n, 2) its points and their normals in the plan;
+    high : metres below which nineteen twentieths of it lie
     """
 
     cells: NDArray[np.int64]
     box: tuple[NDArray[np.int64], NDArray[np.int64]]
-    middle: Array
     plan: Array
     normals: Array
-    low: float
     high: float
 
 
@@ -81,18 +78,17 @@ def _standing(
 ) -> Standing:
     # Bled pixels lie far behind, and would be most of the hull.
     low, high = np.percentile(plan[mask], _MOST, axis=0)
-    inner = plan[mask][((plan[mask] >= low) & (plan[mask] <= high)).all(axis=-1)]
-    cells = _filled(_places(np.unique(_codes(np.floor(inner / cell).astype(np.int64)))))
-    bottom, top = np.percentile(height[mask], (5, 95))
+    points = plan[mask]
+    most = ((points >= low) & (points <= high)).all(axis=-1)
+    points = points[most] if most.any() else points
+    cells = _filled(_places(np.unique(_codes(np.floor(points / cell).astype(np.int64)))))
     known = mask & np.isfinite(normals[..., 0])
     return Standing(
         cells=np.sort(_codes(cells)),
         box=(cells.min(axis=0), cells.max(axis=0)),
-        middle=(cells.mean(axis=0) + 0.5) * cell,
         plan=plan[known],
         normals=normals[known],
-        low=float(bottom),
-        high=float(top),
+        high=float(np.percentile(height[mask], 95)),
     )
 
 
