@@ -40,8 +40,8 @@ def split(
     """Masks (H, W) in which an object is that many; new ones have ids above all others, the
     largest keeps its own.
 
-    It is cut where the boundary (jumps of depth, hollow creases) is strongest; where it has no
-    inner boundary, into groups of near points. Errors: FrameError.
+    It is cut where the boundary (jumps of depth, borders that the network sees) is strongest; where
+    it has no inner boundary, into groups of near points. Errors: FrameError.
     """
     _known(frame, [object_id])
     mask = (frame.segmap == object_id) & frame.valid

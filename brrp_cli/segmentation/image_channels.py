@@ -33,8 +33,11 @@ def image_channels(rgb: NDArray[np.uint8], seen: SeenSurfaces) -> NDArray[np.int
     step = step_of(rgb.shape[:2])
     rows, columns = (size // step for size in rgb.shape[:2])
     window = np.s_[: rows * step, : columns * step]
-    blocks = rgb[window].reshape(rows, step, columns, step, 3)
-    colour = blocks.mean(axis=(1, 3), dtype=np.float32) / np.float32(127.5) - 1
+    # Image by image: many times as fast as a mean over axes of two.
+    total = np.zeros((rows, columns, 3), np.uint32)
+    for i, j in np.ndindex(step, step):
+        total += rgb[window][i::step, j::step]
+    colour = total / np.float32(127.5 * step**2) - 1
     near = np.s_[step // 2 : rows * step : step, step // 2 : columns * step : step]
     normals = seen.normals[near]
     channels = np.concatenate(
