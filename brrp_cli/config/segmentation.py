@@ -211,7 +211,8 @@ class LeftOutConfig:
     cut : part of a mask's outline on the image's border from which on it is left out
     lowest : percentile of its heights that counts as its lower end; stands : metres; what ends no
         higher stands on the table, and so does what ends no higher than `round` times its top, but
-        `round_stands` metres at most: the lower half of a ball
+        `round_stands` metres at most: the lower half of a ball. `over_stands` metres if more than
+        `over` of the mask lies over the table
     foot : percentile of its outline's heights up to which the outline is its foot; reach : pixels
         from the foot that are looked at; touch : metres in depth of what touches it; held : part of
         them that are nearer, or another object that touches it, in which case it may stand
@@ -224,6 +225,8 @@ class LeftOutConfig:
     stands: float = 0.04
     round: float = share(0.6)
     round_stands: float = 0.06
+    over_stands: float = 0.1
+    over: float = share(0.5)
     foot: float = between(25.0, 0.0, 100.0)
     reach: int = between(6, 1, 64)
     touch: float = 0.02

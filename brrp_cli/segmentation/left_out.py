@@ -25,12 +25,13 @@ def left_out(
     segmap: NDArray[np.int64],
     depth: NDArray[np.floating],
     height: NDArray[np.floating],
+    over: NDArray[np.bool_],
     config: LeftOutConfig,
 ) -> dict[int, str]:
     """Why a mask is no whole object on the table, `CUT`, `IN_THE_AIR` or `EDGE`, by id.
 
     segmap : (H, W), 0 = background; depth, height : (H, W) metres along z and above the support
-    plane, NaN = no return
+    plane, NaN = no return; over : (H, W) pixels that lie over the table, no farther than it reaches
     """
     ndimage = import_library("scipy.ndimage")
     reasons = {}
@@ -50,7 +51,11 @@ def left_out(
             continue
         if _at_the_edge(mask, depth[window], height[window], config):
             reasons[object_id] = EDGE
-        elif not _stands(mask, segmap[window], depth[window], height[window], config):
+            continue
+        # The lower half of a ball is hidden; what is beside the table is seldom a ball.
+        is_over = over[window][mask].mean() > config.over
+        round_stands = config.over_stands if is_over else config.round_stands
+        if not _stands(mask, segmap[window], depth[window], height[window], round_stands, config):
             reasons[object_id] = IN_THE_AIR
     return reasons
 
@@ -95,14 +100,18 @@ def _stands(
     segmap: NDArray[np.int64],
     depth: NDArray[np.floating],
     height: NDArray[np.floating],
+    round_stands: float,
     config: LeftOutConfig,
 ) -> bool:
-    """Whether a mask reaches down to the table, or something hides its foot or bears it."""
+    """Whether a mask reaches down to the table, or something hides its foot or bears it.
+
+    round_stands : metres up to which the lower end of what is round may be hidden
+    """
     ndimage = import_library("scipy.ndimage")
     known = mask & np.isfinite(height)
     low, high = np.percentile(height[known], (config.lowest, 100 - config.lowest))
     # Of what is round, seen from above, the lower half is hidden.
-    if low < np.clip(config.round * high, config.stands, config.round_stands):
+    if low < np.clip(config.round * high, config.stands, round_stands):
         return True
     # At the lower end of the outline: what is next to it, in the image?
     outline = known & ~ndimage.binary_erosion(mask)

@@ -86,7 +86,9 @@ def _without(
     segmap = _large(segmap, frame, config.min_area)
     points = np.where(frame.valid[..., None], frame.points, np.nan)
     height = table.plane.signed_distance(points)
-    reasons = left_out(segmap, points[..., 2], height, config.left_out)
+    over, masked = np.zeros(frame.shape, dtype=bool), (segmap > 0) & frame.valid
+    over[masked] = table.holds(table.plan(points[masked]), 0.0)
+    reasons = left_out(segmap, points[..., 2], height, over, config.left_out)
     if reasons:
         log.info("Masks left out: %s (--all keeps them)", told(reasons))
     in_the_air = [i for i, reason in reasons.items() if reason == IN_THE_AIR]

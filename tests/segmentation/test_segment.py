@@ -22,6 +22,8 @@ from brrp_cli.segmentation.refine_borders import refine_borders
 from brrp_cli.segmentation.segment import segment, segment_and_aside
 from brrp_cli.shapes import solids
 
+NOWHERE = np.zeros((60, 80), bool)  # over the table
+
 
 def noisy(depth, seed=0):
     """Depth as a sensor gives it: noise, millimetres, and smeared edges."""
@@ -189,7 +191,7 @@ def test_a_ball_whose_lower_half_is_hidden_stands_and_a_flat_thing_in_the_air_do
     ball = np.linspace(0.09, 0.048, 20)[:, None]
     height = np.where(segmap == 1, np.pad(ball, ((20, 20), (0, 0))), 0.0)
     height = np.where(segmap == 2, 0.062, height)
-    assert left_out(segmap, depth, height, LeftOutConfig()) == {2: IN_THE_AIR}
+    assert left_out(segmap, depth, height, NOWHERE, LeftOutConfig()) == {2: IN_THE_AIR}
 
 
 def test_what_lies_on_a_thing_without_depth_at_its_edge_stands():
@@ -200,8 +202,19 @@ def test_what_lies_on_a_thing_without_depth_at_its_edge_stands():
     height = np.where(segmap == 1, 0.1, np.where(segmap == 2, 0.03, 0.0))
     depth[30:50, 20:40] = np.nan
     height[30:50, 20:40] = np.nan
-    assert left_out(segmap, depth, height, LeftOutConfig()) == {}
-    assert left_out(segmap % 2, depth, height, LeftOutConfig()) == {1: IN_THE_AIR}
+    assert left_out(segmap, depth, height, NOWHERE, LeftOutConfig()) == {}
+    assert left_out(segmap % 2, depth, height, NOWHERE, LeftOutConfig()) == {1: IN_THE_AIR}
+
+
+def test_a_large_ball_over_the_table_stands_and_what_is_beside_the_table_does_not():
+    segmap = np.zeros((60, 80), np.int64)
+    segmap[20:40, 10:30] = 1
+    depth = np.ones((60, 80))
+    # The upper half of a ball of 14 cm.
+    ball = np.linspace(0.14, 0.075, 20)[:, None]
+    height = np.where(segmap > 0, np.pad(ball, ((20, 20), (0, 0))), 0.0)
+    assert left_out(segmap, depth, height, ~NOWHERE, LeftOutConfig()) == {}
+    assert left_out(segmap, depth, height, NOWHERE, LeftOutConfig()) == {1: IN_THE_AIR}
 
 
 def test_a_mask_that_bled_over_the_table_ends_where_colour_does():
@@ -226,6 +239,6 @@ def test_a_smear_at_the_tables_edge_is_told_from_a_flat_thing_on_it():
     segmap[20:24, 10:50] = 1
     segmap[40:44, 10:50] = 2
     height = np.where(segmap > 0, 0.012, 0.0)
-    assert left_out(segmap, depth, height, LeftOutConfig()) == {1: EDGE}
+    assert left_out(segmap, depth, height, NOWHERE, LeftOutConfig()) == {1: EDGE}
     taller = np.where(segmap > 0, (u - 10) / 40 * 0.08, 0.0)
-    assert left_out(segmap, depth, taller, LeftOutConfig()) == {}
+    assert left_out(segmap, depth, taller, NOWHERE, LeftOutConfig()) == {}
