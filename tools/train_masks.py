@@ -19,7 +19,6 @@ from __future__ import annotations
 import sys
 from collections import Counter
 from pathlib import Path
-from time import monotonic
 
 import click
 import numpy as np
@@ -28,8 +27,8 @@ from tqdm import tqdm
 # The script also runs from a checkout that is not installed.
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from training.interrupted import signalled
 from training.scene_sets import check_names
+from training.watched import late_after, run_watched
 
 from brrp_cli.errors import BrrpError
 from brrp_cli.files import sha256_file
@@ -87,7 +86,7 @@ def main(
 
     from brrp_cli.segmentation.affinity_network import AffinityNetworkConfig
 
-    began = monotonic()
+    late = late_after(minutes)
     try:
         if cooling > epochs:
             raise BrrpError("--cooling is a part of --epochs", found=f"{cooling} of {epochs}")
@@ -122,32 +121,12 @@ def main(
         config = TrainingConfig(epochs=epochs, cooling=cooling, batch=batch, rate=rate, seed=seed)
         network = started(AffinityNetworkConfig(), seed) if begin is None else resumed(begin)
         training = Training(network, config, output, len(train))
-        done, steps = training.progress, len(training.batches(len(train), 0))
-        if done.epoch or done.step:
-            click.echo(f"Going on after epoch {done.epoch}, step {done.step}", err=True)
-        total = epochs * steps
-        with tqdm(total=total, initial=done.epoch * steps + done.step, desc="steps") as bar:
-
-            def stepped(loss: float) -> None:
-                bar.set_postfix(loss=f"{loss:.4f}", refresh=False)
-                bar.update()
-
-            def ended(record: dict[str, float]) -> None:
-                bar.write(", ".join(f"{name} {value:.4g}" for name, value in record.items()))
-
-            with signalled() as stop:
-
-                def go_on() -> bool:
-                    late = minutes is not None and monotonic() - began >= 60 * minutes
-                    return not (late or stop.is_set())
-
-                finished = training.run(train, held, go_on=go_on, stepped=stepped, ended=ended)
+        finished = run_watched(training, train, held, late)
     except BrrpError as error:
         raise click.ClickException(str(error)) from error
     if not finished:
-        click.echo(f"Stopped in epoch {done.epoch + 1}; the same command goes on")
         return
-    record = min(done.history, key=lambda each: each["held_loss"])
+    record = min(training.progress.history, key=lambda each: each["held_loss"])
     about = {
         "views": len(train),
         "sets": Counter(name.partition("/")[0] for name in train.names),

@@ -27,7 +27,6 @@ from __future__ import annotations
 import sys
 from collections import Counter
 from pathlib import Path
-from time import monotonic
 
 import click
 from tqdm import tqdm
@@ -36,8 +35,8 @@ from tqdm import tqdm
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from training.examples import TRUTHS, Recipe, make_examples, read_examples
-from training.interrupted import signalled
 from training.scene_sets import check_names
+from training.watched import late_after, run_watched
 
 from brrp_cli.errors import BrrpError
 from brrp_cli.evaluation.request import find_data_root
@@ -105,7 +104,7 @@ def main(
     from brrp_cli.device import pick_device
     from brrp_cli.methods.pointsdf.network import NetworkConfig
 
-    began = monotonic()
+    late = late_after(minutes)
     try:
         if cooling > epochs:
             raise BrrpError("--cooling is a part of --epochs", found=f"{cooling} of {epochs}")
@@ -155,38 +154,18 @@ def main(
         )
         weights = output / f"{output.name}.safetensors"
         training = Training(network, config, output, weights, about, pick_device(device))
-        done = training.progress
-        if done.epoch or done.step:
-            click.echo(f"Going on after epoch {done.epoch}, step {done.step}", err=True)
-        steps = len(training.batches(len(train), 0))
-        total = epochs * steps
-        with tqdm(total=total, initial=done.epoch * steps + done.step, desc="steps") as bar:
-
-            def stepped(loss: float) -> None:
-                bar.set_postfix(loss=f"{loss:.4f}", refresh=False)
-                bar.update()
-
-            def ended(record: dict[str, float]) -> None:
-                bar.write(
-                    f"epoch {record['epoch']}: loss {record['train_loss']:.4f}, validation "
-                    f"{record['validation_loss']:.4f}, IoU {record['validation_iou']:.3f}, "
-                    f"{record['seconds']:.0f} s"
-                )
-
-            with signalled() as stop:
-
-                def go_on() -> bool:
-                    late = minutes is not None and monotonic() - began >= 60 * minutes
-                    return not (late or stop.is_set())
-
-                finished = training.run(
-                    train, held, every=every, go_on=go_on, stepped=stepped, ended=ended
-                )
+        run_watched(training, train, held, late, every=every, line=_line)
     except BrrpError as error:
         raise click.ClickException(str(error)) from error
-    if not finished:
-        click.echo(f"Stopped in epoch {done.epoch + 1}; the same command goes on")
     click.echo(f"Wrote {output}/ ({weights.name}, history.json, checkpoint.pt)")
+
+
+def _line(record: dict[str, float]) -> str:
+    return (
+        f"epoch {record['epoch']}: loss {record['train_loss']:.4f}, validation "
+        f"{record['validation_loss']:.4f}, IoU {record['validation_iou']:.3f}, "
+        f"{record['seconds']:.0f} s"
+    )
 
 
 if __name__ == "__main__":

@@ -93,7 +93,8 @@ class AffinitiesConfig:
     colour : what the network says when it sees colours counts so much, and the rest what it says
         without: real prints and shadows are stranger to it than real depth
     least : that a pixel shows an object, or it is depth that bled
-    alike : mean affinity of the pixels of two parts from which on they are one object
+    alike : mean affinity of the pixels of two parts from which on they are one object: training
+        counts pairs of two objects four times, so that less than a half is even
     components : the parts that are joined, in pixels of the network's image
     """
 
@@ -107,7 +108,8 @@ class AffinitiesConfig:
 class FootprintsConfig:
     """Insides that stand on one spot of the table with their outsides.
 
-    cell : metres of the plan's grid
+    cell : metres of the plan's grid; bled : percent of the points on each side, along each axis of
+        the plan, that may have bled and are no part of a footprint
     overlap : part of the smaller footprint that both share, at least
     inward, facing : mean cosine to the middle: of an inside that shares the footprint, and of
         walls of which one is seen from within and one from without (of a round one 0.9)
@@ -116,6 +118,7 @@ class FootprintsConfig:
     """
 
     cell: float = 0.003
+    bled: float = between(1.0, 0.0, 50.0)
     overlap: float = share(0.3)
     inward: float = between(0.3, -1.0, 1.0)
     facing: float = between(0.7, -1.0, 1.0)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import logging
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -16,6 +18,8 @@ from brrp_cli.segmentation.concave_edges import depth_jumps, hollow_creases, sur
 from brrp_cli.segmentation.learned_affinities import affinities_of, shipped
 from brrp_cli.segmentation.seen_surfaces import see_surfaces, smoothed
 
+log = logging.getLogger(__name__)
+
 
 def boundary_of(frame: Frame, config: SegmentConfig) -> NDArray[np.float64]:
     """Where one thing ends (H, W), 0 to 1: jumps of depth, and borders that the network sees, or
@@ -23,6 +27,7 @@ def boundary_of(frame: Frame, config: SegmentConfig) -> NDArray[np.float64]:
     try:
         seen = see_surfaces(frame, 0, config)
     except FrameError:
+        log.info("No table is seen: masks are cut at jumps of depth and hollow creases alone")
         return _without_a_table(frame, config)
     affinities = affinities_of(frame.rgb, seen, shipped(), config.affinities.colour)
     return np.maximum(affinities.enlarge(borders_of(affinities)), seen.jumps)

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from brrp_cli.segmentation.seen_surfaces import SeenSurfaces
 
+# All numbers here are as the network was trained: others ask for another training.
 # Colour (3), height, normal (3), rise of the normal, hollow crease, jump, depth is there.
 CHANNELS = 11
 COLOURS = slice(0, 3)

@@ -16,8 +16,6 @@ Array = NDArray[np.floating]
 
 # No table has so many cells from its middle to its edge.
 _HALF = 2**24
-# Percentiles between which points tell the footprint.
-_MOST = (1, 99)
 
 
 @dataclass(frozen=True)
@@ -53,9 +51,7 @@ def join_insides(
     count = int(parts.max()) + 1
     ndimage = import_library("scipy.ndimage")
     standing = {
-        i: _standing(
-            parts[window] == i, plan[window], height[window], plan_normals[window], config.cell
-        )
+        i: _standing(parts[window] == i, plan[window], height[window], plan_normals[window], config)
         for i, window in enumerate(ndimage.find_objects(parts), start=1)
         if window is not None
     }
@@ -74,14 +70,14 @@ def join_insides(
 
 
 def _standing(
-    mask: NDArray[np.bool_], plan: Array, height: Array, normals: Array, cell: float
+    mask: NDArray[np.bool_], plan: Array, height: Array, normals: Array, config: FootprintsConfig
 ) -> Standing:
     # Bled pixels lie far behind, and would be most of the hull.
-    low, high = np.percentile(plan[mask], _MOST, axis=0)
+    low, high = np.percentile(plan[mask], (config.bled, 100 - config.bled), axis=0)
     points = plan[mask]
     most = ((points >= low) & (points <= high)).all(axis=-1)
     points = points[most] if most.any() else points
-    cells = _filled(_places(np.unique(_codes(np.floor(points / cell).astype(np.int64)))))
+    cells = _filled(_places(np.unique(_codes(np.floor(points / config.cell).astype(np.int64)))))
     known = mask & np.isfinite(normals[..., 0])
     return Standing(
         cells=np.sort(_codes(cells)),

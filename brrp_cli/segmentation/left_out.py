@@ -52,7 +52,7 @@ def left_out(
         if _at_the_edge(mask, depth[window], height[window], config):
             reasons[object_id] = EDGE
             continue
-        # The lower half of a ball is hidden; what is beside the table is seldom a ball.
+        # Balls lie on the table, and beside it are other things.
         is_over = over[window][mask].mean() > config.over
         round_stands = config.over_stands if is_over else config.round_stands
         if not _stands(mask, segmap[window], depth[window], height[window], round_stands, config):

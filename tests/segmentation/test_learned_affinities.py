@@ -92,9 +92,11 @@ def test_torchs_threads_change_no_byte(scene):
     seen = see_surfaces(make_frame(depth=scene.depth, K=scene.K), 0, SegmentConfig())
     before = torch.get_num_threads()
     found = []
-    for threads in (1, 4):
-        torch.set_num_threads(threads)
-        found.append(affinities_of(scene.rgb, seen, shipped(), 0.5).same.tobytes())
-        assert torch.get_num_threads() == threads
-    torch.set_num_threads(before)
+    try:
+        for threads in (1, 4):
+            torch.set_num_threads(threads)
+            found.append(affinities_of(scene.rgb, seen, shipped(), 0.5).same.tobytes())
+            assert torch.get_num_threads() == threads
+    finally:
+        torch.set_num_threads(before)
     assert found[0] == found[1]

@@ -117,6 +117,15 @@ def test_things_that_touch_are_two(placed):
         assert best > 0.7, truth
 
 
+@pytest.mark.parametrize(("top", "count"), [((210, 170, 20), 1), ((150, 40, 160), 2)])
+def test_a_stud_of_its_bricks_colour_is_no_thing_of_its_own(top, count):
+    frame = boxes(((0.16, 0.14, 0.06), 0, 0, 0), ((0.07, 0.06, 0.07), 0, 0, 0.06))
+    rgb = np.full((*frame.shape, 3), 120, np.uint8)
+    rgb[frame.segmap == 1] = (220, 180, 30)
+    rgb[frame.segmap == 2] = top
+    assert segment(replace(frame, rgb=rgb)).max() == count
+
+
 def test_a_thin_thing_is_found():
     frame = boxes(((0.16, 0.04, 0.01), 0, 0, 0))
     assert overlap(segment(frame) == 1, frame.segmap == 1) > 0.6

@@ -13,6 +13,7 @@ from training.mask_batches import draw_batch
 from training.mask_examples import Examples, is_held, read_examples
 from training.masks import loss_of
 
+from brrp_cli.errors import BrrpError
 from brrp_cli.segmentation.affinity_network import OFFSETS
 from brrp_cli.segmentation.image_channels import CHANNELS, SIDEWAYS
 from brrp_cli.segmentation.learned_affinities import load_affinity_network
@@ -62,6 +63,15 @@ def test_examples_have_the_true_labels(place):
     assert np.unique(found.labels).tolist() == [0, 1, 2]
     height = found.channels[:, 3]
     assert height[found.labels > 0].mean() > 10 > 2 > abs(np.median(height[found.labels == 0]))
+
+
+def test_views_of_two_sizes_are_told(place, tmp_path):
+    first = next((place / "made" / "examples").glob("*/*.npz"))
+    np.savez(tmp_path / "b.npz", channels=np.zeros((CHANNELS, 4, 5)), labels=np.zeros((4, 5)))
+    np.savez(tmp_path / "c.npz", channels=np.zeros((CHANNELS, 0, 0)), labels=np.zeros((0, 0)))
+    with pytest.raises(BrrpError, match="two sizes"):
+        read_examples([first, tmp_path / "b.npz"])
+    assert len(read_examples([first, tmp_path / "c.npz"])) == 1
 
 
 def test_the_loss_is_nothing_where_all_is_right_and_one_pair_too_many_costs():

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brrp_cli.config.segmentation import SegmentConfig
-from brrp_cli.errors import FrameError
+from brrp_cli.errors import BrrpError, FrameError
 from brrp_cli.files import write_bytes
 from brrp_cli.ground_truth.scenes import Scene
 from brrp_cli.seeds import child_rng
@@ -73,10 +73,11 @@ def make_view(wanted: Wanted, seed: int, folder: Path) -> Path:
         channels = np.zeros((CHANNELS, 0, 0), np.int8)
     step, size = step_of(frame.shape), channels.shape[1:]
     labels = frame.segmap[step // 2 :: step, step // 2 :: step][: size[0], : size[1]]
+    # 0 and then 1, 2, ...: ids may be of any size.
+    ids = np.unique(labels[labels > 0])
+    labels = np.where(labels > 0, np.searchsorted(ids, labels) + 1, 0).astype(np.uint8)
     buffer = BytesIO()
-    np.savez_compressed(
-        buffer, channels=channels, labels=np.where(labels > 0, labels, 0).astype(np.uint8)
-    )
+    np.savez_compressed(buffer, channels=channels, labels=labels)
     path.parent.mkdir(parents=True, exist_ok=True)
     write_bytes(path, buffer.getvalue())
     return path
@@ -90,15 +91,23 @@ def make_all(every: Sequence[Wanted], seed: int, folder: Path, workers: int) -> 
 
 
 def read_examples(paths: Sequence[Path]) -> Examples:
-    """The examples of all files that are not empty; those of another size than the first are
-    left out."""
+    """The examples of all files that are not empty. Errors: BrrpError if their sizes differ."""
     channels, labels, names = [], [], []
     for path in paths:
         with np.load(path, allow_pickle=False) as file:
-            if file["labels"].size and (not labels or file["labels"].shape == labels[0].shape):
-                channels.append(file["channels"])
-                labels.append(file["labels"])
-                names.append(f"{path.parent.name}/{path.stem}")
+            if not file["labels"].size:
+                continue
+            if labels and file["labels"].shape != labels[0].shape:
+                raise BrrpError(
+                    "Views of two sizes cannot be trained on together",
+                    where=path,
+                    expected=f"rows and columns {labels[0].shape}, as of the first",
+                    found=file["labels"].shape,
+                    fix="make all scenes at one size, and the examples anew",
+                )
+            channels.append(file["channels"])
+            labels.append(file["labels"])
+            names.append(f"{path.parent.name}/{path.stem}")
     if not labels:
         return Examples(np.empty((0, CHANNELS, 0, 0), np.int8), np.empty((0, 0, 0), np.uint8), ())
     return Examples(np.stack(channels), np.stack(labels), tuple(names))
