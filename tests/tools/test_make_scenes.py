@@ -10,13 +10,14 @@ from PIL import Image
 pytest.importorskip("pybullet")
 
 from make_scenes import main
+from tabletop import check
 from tabletop.models import find_meshes, load_model
 from tabletop.render import FAR, NEAR, perspective
 from tabletop.scene import Plan, make_scene, noisy_buffer
 from tabletop.settle import drop
 from tabletop.stack import stack
 
-from brrp_cli.errors import MeshError
+from brrp_cli.errors import MeshError, SceneError
 from brrp_cli.geometry import transform_points
 from brrp_cli.ground_truth.scenes import find_scenes, true_mesh
 
@@ -181,6 +182,23 @@ def test_check_fails_when_a_pose_is_wrong_by_a_centimetre(data, made, tmp_path):
     assert failed.exit_code == 1
     assert "do not lie on the posed mesh" in failed.output
     assert f"object {seen} (" in failed.output
+
+
+def test_of_measured_depth_half_of_the_objects_may_lie_elsewhere(made, data, tmp_path, monkeypatch):
+    monkeypatch.setattr(check, "SENSOR_PIXELS", check.MIN_PIXELS)  # in small images
+    scene = copy_of(made, tmp_path / "scenes") / "00000001"
+    assert all(each.median < check.CLEAN[0] for each in check.check_measured_scene(scene, data))
+    path = scene / "objects.json"
+    entries = json.loads(path.read_text())
+    for count, fails in ((1, False), (len(entries), True)):
+        for entry in entries[:count]:
+            entry["position"][2] = 1.0
+        path.write_text(json.dumps(entries))
+        if fails:
+            with pytest.raises(SceneError, match="for half of the objects"):
+                check.check_measured_scene(scene, data)
+        else:
+            check.check_measured_scene(scene, data)
 
 
 def test_check_fails_on_an_id_that_is_no_objects(data, made, tmp_path):

@@ -14,7 +14,13 @@ from brrp_cli.errors import SceneError
 from brrp_cli.files import atomic_folder
 from brrp_cli.frames.published import depth_from_buffer, intrinsics_from_projection
 from brrp_cli.seeds import child_rng
-from tabletop.check import CLEAN, SENSOR, SENSOR_PIXELS, STRUCTURED_LIGHT, Distance, check_scene
+from tabletop.check import (
+    CLEAN,
+    STRUCTURED_LIGHT,
+    Distance,
+    check_measured_scene,
+    check_scene,
+)
 from tabletop.light import draw_light, relight
 from tabletop.models import Model, load_model
 from tabletop.render import FAR, NEAR, NOTHING, Camera, Picture, draw_camera, draw_look, render
@@ -50,10 +56,10 @@ class Plan:
 
 
 def check_depth(folder: Path, data_root: Path, noise: str, sensor: str) -> list[Distance]:
-    """`check_scene` with what such depth allows."""
+    """`check_scene`, or `check_measured_scene`, with what such depth allows."""
     if sensor == "none":
         return check_scene(folder, data_root, LIMITS[noise])
-    return check_scene(folder, data_root, SENSOR, SENSOR_PIXELS)
+    return check_measured_scene(folder, data_root)
 
 
 def make_scene(plan: Plan, number: int, check: bool) -> list[Distance]:
