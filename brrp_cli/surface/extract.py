@@ -46,6 +46,10 @@ def extract_surface(
         # between them would be that of nothing.
         moved = moved_to_level(through, config.level, through.own, stay=explained.kin)
         deviation = moved_to_level(through, config.level).deviation
+        # Between placements that are apart occupancy hardly falls, however near they are.
+        deviation = np.minimum(
+            deviation, np.hypot(moved.deviation, through.apart, dtype=np.float32)
+        )
         if explained.kin:
             # Walls of several kin that miss each other have no surface in common.
             most = np.hypot(moved.deviation, 2 * config.farthest).astype(np.float32)

@@ -18,6 +18,8 @@ from brrp_cli.inference.placed_shape import PlacedShape
 from brrp_cli.inference.posterior import occupancy
 
 Array = NDArray[np.float64]
+# Metres: another hypothesis' surface is never further.
+_FARTHEST = 0.05
 
 
 @dataclass(frozen=True)
@@ -26,7 +28,8 @@ class AlongNormals:
 
     vertices, normals : (n, 3), metres, camera frame; way : (steps, n) metres along the normals,
     ascending; particles : (P, steps, n) occupancy of each particle; mean : (steps, n), over all of
-    them; own : (steps, n), over those of the placed shape alone
+    them; own : (steps, n), over those of the placed shape alone; apart : (n,) metres, root mean
+    square over all hypotheses of how far their surfaces are
     """
 
     vertices: Array
@@ -35,6 +38,7 @@ class AlongNormals:
     particles: NDArray[np.float32]
     mean: NDArray[np.float32]
     own: NDArray[np.float32]
+    apart: Array
 
 
 @dataclass(frozen=True)
@@ -65,6 +69,7 @@ def along_normals(
     way = np.where(steps < 0, steps * inwards, steps * config.farthest)
     correction = posterior.correction.logits(vertices)
     logits = np.repeat(correction[:, None], len(way), axis=1)
+    apart = np.zeros(len(vertices))
     for each, mean in enumerate(posterior.means):
         if mean is shape:
             line: NDArray[np.floating] = np.clip(-way / shape.width, -shape.limit, shape.limit)
@@ -74,6 +79,8 @@ def along_normals(
             line = middle + np.where(
                 steps < 0, -steps * (ends[0] - middle), steps * (ends[1] - middle)
             )
+            distance = _distance(mean, vertices, middle, (ends[0] - ends[1]) / (way[-1] - way[0]))
+            apart += posterior.weights[each] * distance**2
         logits[posterior.which == each] += line.astype(np.float32)
     particles = occupancy(logits)
     mean_occupancy = np.tensordot(posterior.shares, particles, axes=1).astype(np.float32)
@@ -81,7 +88,9 @@ def along_normals(
     own = np.tensordot(
         posterior.shares[mine] / posterior.shares[mine].sum(), particles[mine], axes=1
     )
-    return AlongNormals(vertices, normals, way, particles, mean_occupancy, own.astype(np.float32))
+    return AlongNormals(
+        vertices, normals, way, particles, mean_occupancy, own.astype(np.float32), np.sqrt(apart)
+    )
 
 
 def placed(posterior: HypothesisPosterior, number: int) -> PlacedShape:
@@ -132,6 +141,19 @@ def wall_thickness(shape: PlacedShape) -> Array:
     query = o3d.core.Tensor(np.ascontiguousarray(rays, dtype=np.float32))
     hit = shape.shape.scene.cast_rays(query, nthreads=1)["t_hit"].numpy().astype(np.float64)
     return np.asarray((np.where(np.isfinite(hit), hit, np.inf) + start) * shape.unit)
+
+
+def _distance(
+    mean: MeanFunction, vertices: Array, logits: NDArray[np.floating], fall: NDArray[np.floating]
+) -> Array:
+    """(n,) metres from each vertex to a hypothesis' surface: to that of a placed shape as its
+    coarse field has it, to another as far as its logits (n,) there fall to 0 by `fall` (n,) a
+    metre."""
+    if isinstance(mean, PlacedShape):
+        found = np.abs(mean.signed_distance(vertices, 0.0))
+    else:
+        found = np.abs(logits) / np.maximum(np.abs(fall), 1e-6)
+    return np.asarray(np.minimum(found, _FARTHEST), dtype=np.float64)
 
 
 def _coarse_logits(mean: MeanFunction, points: Array) -> NDArray[np.float32]:

@@ -13,7 +13,7 @@ from closed_shapes import at
 from brrp_cli.errors import BrrpError
 from brrp_cli.geometry import similarity
 from brrp_cli.inference.hinge import HingeGrid
-from brrp_cli.inference.hypothesis_posterior import LARGEST, HypothesisPosterior
+from brrp_cli.inference.hypothesis_posterior import GROWTH, LARGEST, LOCAL, HypothesisPosterior
 from brrp_cli.inference.mean_grid import MeanGrid
 from brrp_cli.inference.placed_shape import PlacedShape
 from brrp_cli.inference.posterior import HilbertPosterior
@@ -71,13 +71,22 @@ def shapes():
     return box, replace(box, T_cam_shape=shift @ box.T_cam_shape), ball
 
 
-@pytest.mark.parametrize("width", [0.002, 0.005, 0.01])
+@pytest.mark.parametrize("width", [0.002, 0.0025])
 def test_the_spread_of_a_logistic_surface_is_that_of_its_distribution(width):
     """sigmoid(-x / s) is a logistic distribution of the surface's place: pi s / sqrt(3)."""
     found = posterior(ramp(width)).surface_uncertainty(CENTER[None])
     # Between nodes 2.5 mm apart, difference quotients over 2 mm are a little too flat.
     assert found[0] == pytest.approx(np.pi * width / np.sqrt(3), rel=0.05)
     assert found.dtype == np.float32
+
+
+def test_a_surface_that_is_little_known_is_not_told_to_be_anywhere():
+    """Beyond `LOCAL`, twice as gentle a slope makes the spread 2^0.6 times as large."""
+    one, two = (
+        posterior(ramp(each)).surface_uncertainty(CENTER[None])[0] for each in (0.005, 0.01)
+    )
+    assert one == pytest.approx(LOCAL * (np.pi * 0.005 / np.sqrt(3) / LOCAL) ** GROWTH, rel=0.05)
+    assert two / one == pytest.approx(2**GROWTH, rel=0.05)
 
 
 def test_the_spread_does_not_depend_on_which_way_the_surface_faces():

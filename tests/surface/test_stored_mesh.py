@@ -151,6 +151,23 @@ def test_placements_are_averaged_as_probabilities(block):
 OBSERVED = CENTER[None]
 
 
+def test_where_placements_part_the_surface_is_as_uncertain_as_they_are_apart(block):
+    """Two of them, one 8 mm along the block's own x: between them occupancy hardly falls."""
+    shift = np.eye(4)
+    shift[:3, 3] = 0.008 * TURN[:, 0]
+    other = replace(block, T_cam_shape=shift @ block.T_cam_shape)
+    both = corrected([block, other], shares=(0.6, 0.4))
+    alone = extract_surface(corrected([block]), block.vertices, CONFIG)
+    found = extract_surface(both, block.vertices, CONFIG)
+    local = (found.vertices - CENTER) @ TURN
+    own = alone.uncertainty.mean()
+    # The face that both placements have apart, and the faces that lie in one plane.
+    parted = found.uncertainty[local[:, 0] < -0.0299]
+    np.testing.assert_allclose(parted, np.hypot(own, np.sqrt(0.4) * 0.008), rtol=0.1)
+    shared = found.uncertainty[np.abs(local[:, 0]) < 0.015]
+    np.testing.assert_allclose(shared, own, rtol=0.1)
+
+
 def test_a_recognised_object_has_its_own_mesh_with_its_colours(block):
     surface = extract_surface(corrected([block], 0.5), OBSERVED, CONFIG)
     np.testing.assert_array_equal(surface.faces, block.shape.faces)
