@@ -21,7 +21,9 @@ def is_solid(mesh: trimesh.Trimesh) -> bool:
 
 def is_flat(body: trimesh.Trimesh) -> bool:
     """Whether a closed body encloses nothing, such as a sheet that lies back to back."""
-    return bool(abs(body.volume) <= 1e-9 * body.area**1.5)
+    # Of no volume trimesh divides by it, for the centre of mass.
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return bool(abs(body.volume) <= 1e-9 * body.area**1.5)
 
 
 def unite_bodies(mesh: trimesh.Trimesh) -> tuple[trimesh.Trimesh, list[str]]:

@@ -16,7 +16,7 @@ from mesh_zoo import (
 
 from brrp_cli.errors import MeshError
 from brrp_cli.prior.build.repair import boundary_rims, repair
-from brrp_cli.prior.build.solids import is_solid
+from brrp_cli.prior.build.solids import is_solid, unite_bodies
 
 VOLUME = 0.10 * 0.06 * 0.04
 
@@ -167,3 +167,14 @@ def test_edges_that_no_split_parts_do_not_stop_the_filling_of_holes() -> None:
     assert is_solid(repaired.mesh)
     assert any("no split parts" in step for step in repaired.record["steps"])
     assert repaired.record["original_to_repaired"]["max"] < 0.03
+
+
+@pytest.mark.filterwarnings("error::RuntimeWarning")
+def test_a_sheet_beside_a_box_is_dropped_without_a_warning() -> None:
+    corners = [[0.2, 0.0, 0.0], [0.3, 0.0, 0.0], [0.3, 0.1, 0.0], [0.2, 0.1, 0.0]]
+    both_sides = [[0, 1, 2], [0, 2, 3], [2, 1, 0], [3, 2, 0]]
+    sheet = trimesh.Trimesh(corners, both_sides, process=False)
+    box = trimesh.creation.box((0.1, 0.1, 0.1))
+    united, steps = unite_bodies(trimesh.util.concatenate([box, sheet]))
+    assert united.volume == pytest.approx(box.volume)
+    assert steps == ["dropped 1 bodies without volume"]
