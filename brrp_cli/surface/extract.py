@@ -13,7 +13,7 @@ from brrp_cli.finite import check_finite
 from brrp_cli.inference.hypothesis_posterior import HypothesisPosterior
 from brrp_cli.reconstruction import Axes, OccupancyPosterior, Surface
 from brrp_cli.surface.connect import near_observed, one_piece
-from brrp_cli.surface.stored_mesh import along_normals, moved_to_level, placed
+from brrp_cli.surface.stored_mesh import along_normals, moved_to_level, placed, spread_of_all
 
 # How far, at least, the occupancy of what is inside lies above the level: 10 micrometres.
 _CLEAR = 1e-3
@@ -47,9 +47,8 @@ def extract_surface(
         moved = moved_to_level(through, config.level, through.own, stay=explained.kin)
         deviation = moved_to_level(through, config.level).deviation
         # Between placements that are apart occupancy hardly falls, however near they are.
-        deviation = np.minimum(
-            deviation, np.hypot(moved.deviation, through.apart, dtype=np.float32)
-        )
+        together = spread_of_all(through, moved.deviation, explained.width)
+        deviation = np.minimum(deviation, together).astype(np.float32)
         if explained.kin:
             # Walls of several kin that miss each other have no surface in common.
             most = np.hypot(moved.deviation, 2 * config.farthest).astype(np.float32)

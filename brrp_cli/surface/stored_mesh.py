@@ -15,7 +15,7 @@ from brrp_cli.config import SurfaceConfig
 from brrp_cli.dependencies import import_open3d
 from brrp_cli.inference.hypothesis_posterior import HypothesisPosterior, MeanFunction, deviation
 from brrp_cli.inference.placed_shape import PlacedShape
-from brrp_cli.inference.posterior import occupancy
+from brrp_cli.inference.posterior import LOGISTIC_DEVIATION, occupancy
 
 Array = NDArray[np.float64]
 # Metres: another hypothesis' surface is never further.
@@ -28,8 +28,9 @@ class AlongNormals:
 
     vertices, normals : (n, 3), metres, camera frame; way : (steps, n) metres along the normals,
     ascending; particles : (P, steps, n) occupancy of each particle; mean : (steps, n), over all of
-    them; own : (steps, n), over those of the placed shape alone; apart : (n,) metres, root mean
-    square over all hypotheses of how far their surfaces are
+    them; own : (steps, n), over those of the placed shape alone; beyond : (n,) metres from the end
+    of the way to where the latter falls through 0.5, 0 where it does on the way; apart : (n,)
+    metres, root mean square over all hypotheses of how far their surfaces are
     """
 
     vertices: Array
@@ -38,6 +39,7 @@ class AlongNormals:
     particles: NDArray[np.float32]
     mean: NDArray[np.float32]
     own: NDArray[np.float32]
+    beyond: Array
     apart: Array
 
 
@@ -88,8 +90,18 @@ def along_normals(
     own = np.tensordot(
         posterior.shares[mine] / posterior.shares[mine].sum(), particles[mine], axes=1
     )
+    first, last = np.clip(own[[0, -1]], 1e-6, 1 - 1e-6)
+    short = np.maximum(np.log(1 / first - 1), -np.log(1 / last - 1))
+    beyond = shape.width * np.maximum(short, 0.0)
     return AlongNormals(
-        vertices, normals, way, particles, mean_occupancy, own.astype(np.float32), np.sqrt(apart)
+        vertices,
+        normals,
+        way,
+        particles,
+        mean_occupancy,
+        own.astype(np.float32),
+        beyond,
+        np.sqrt(apart),
     )
 
 
@@ -98,6 +110,14 @@ def placed(posterior: HypothesisPosterior, number: int) -> PlacedShape:
     shape = posterior.means[number]
     assert isinstance(shape, PlacedShape)
     return shape
+
+
+def spread_of_all(through: AlongNormals, own: NDArray[np.floating], width: float) -> Array:
+    """(n,) metres, standard deviation of the place of the surface, of whichever hypothesis: how far
+    they are apart, and the placed shape's `own` (n,). Where its surface is not met on the way, as
+    in thin walls, its own is that of a logistic function of `width` metres and what is beyond."""
+    alone = np.where(through.beyond > 0, np.hypot(LOGISTIC_DEVIATION * width, through.beyond), own)
+    return np.asarray(np.hypot(alone, through.apart))
 
 
 def moved_to_level(

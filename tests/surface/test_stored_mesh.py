@@ -168,6 +168,18 @@ def test_where_placements_part_the_surface_is_as_uncertain_as_they_are_apart(blo
     np.testing.assert_allclose(shared, own, rtol=0.1)
 
 
+def test_a_wall_too_thin_for_the_way_is_as_uncertain_as_its_surface_is_beyond(thin):
+    """A correction of -2 moves the surface inwards by 2 widths, further than half of the wall."""
+    assert 0.4 * CUP_WALL < 2 * WIDTH
+    through = along_normals(corrected([thin], -2.0), 0, CONFIG)
+    on_wall = wall_thickness(thin) < 1.5 * CUP_WALL
+    ends = through.way[0, on_wall]
+    np.testing.assert_allclose(through.beyond[on_wall], 2 * WIDTH + ends, atol=1e-5)
+    found = extract_surface(corrected([thin], -2.0), thin.vertices, replace(CONFIG, most_off=1.0))
+    spread = np.hypot(np.pi * WIDTH / np.sqrt(3), through.beyond[on_wall])
+    np.testing.assert_allclose(found.uncertainty[on_wall], spread, rtol=0.02)
+
+
 def test_a_recognised_object_has_its_own_mesh_with_its_colours(block):
     surface = extract_surface(corrected([block], 0.5), OBSERVED, CONFIG)
     np.testing.assert_array_equal(surface.faces, block.shape.faces)
