@@ -17,6 +17,7 @@ class SurfaceConfig:
     moved further, and where no stored object explains what is seen, the surface comes from marching
     cubes on a grid of about `nodes` nodes, whose spacing in metres lies between `finest` and
     `spacing`.
+    most_apart : metres; how far another hypothesis' surface counts as apart, for the uncertainty
     around_nodes : of the grid on which the confidence surface around a stored mesh is found, whose
     spacing is `around_finest` metres at least
     fidelity : metres, standard deviation of a stored mesh from its object; pose_share : of what the
@@ -55,6 +56,7 @@ class SurfaceConfig:
     farthest: float = 0.004
     wall_share: float = share(0.4)
     steps: int = 17
+    most_apart: float = 0.05
     fidelity: float = 0.00025
     pose_share: float = share(0.9)
     band_draws: int = 4_000

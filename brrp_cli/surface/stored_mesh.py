@@ -18,8 +18,6 @@ from brrp_cli.inference.placed_shape import PlacedShape
 from brrp_cli.inference.posterior import LOGISTIC_DEVIATION, occupancy
 
 Array = NDArray[np.float64]
-# Metres: another hypothesis' surface is never further.
-_FARTHEST = 0.05
 
 
 @dataclass(frozen=True)
@@ -76,13 +74,16 @@ def along_normals(
         if mean is shape:
             line: NDArray[np.floating] = np.clip(-way / shape.width, -shape.limit, shape.limit)
         else:
-            ends = [_coarse_logits(mean, vertices + way[[i]].T * normals) for i in (0, -1)]
-            middle = _coarse_logits(mean, vertices)
+            ends = [_coarse(mean, vertices + way[[i]].T * normals)[0] for i in (0, -1)]
+            middle, distance = _coarse(mean, vertices)
             line = middle + np.where(
                 steps < 0, -steps * (ends[0] - middle), steps * (ends[1] - middle)
             )
-            distance = _distance(mean, vertices, middle, (ends[0] - ends[1]) / (way[-1] - way[0]))
-            apart += posterior.weights[each] * distance**2
+            if distance is None:
+                # As far as the logit falls to 0 by its slope here.
+                fall = np.abs(ends[0] - ends[1]) / (way[-1] - way[0])
+                distance = np.abs(middle) / np.maximum(fall, 1e-6)
+            apart += posterior.weights[each] * np.minimum(distance, config.most_apart) ** 2
         logits[posterior.which == each] += line.astype(np.float32)
     particles = occupancy(logits)
     mean_occupancy = np.tensordot(posterior.shares, particles, axes=1).astype(np.float32)
@@ -163,22 +164,12 @@ def wall_thickness(shape: PlacedShape) -> Array:
     return np.asarray((np.where(np.isfinite(hit), hit, np.inf) + start) * shape.unit)
 
 
-def _distance(
-    mean: MeanFunction, vertices: Array, logits: NDArray[np.floating], fall: NDArray[np.floating]
-) -> Array:
-    """(n,) metres from each vertex to a hypothesis' surface: to that of a placed shape as its
-    coarse field has it, to another as far as its logits (n,) there fall to 0 by `fall` (n,) a
-    metre."""
-    if isinstance(mean, PlacedShape):
-        found = np.abs(mean.signed_distance(vertices, 0.0))
-    else:
-        found = np.abs(logits) / np.maximum(np.abs(fall), 1e-6)
-    return np.asarray(np.minimum(found, _FARTHEST), dtype=np.float64)
-
-
-def _coarse_logits(mean: MeanFunction, points: Array) -> NDArray[np.float32]:
-    """Logits from a shape's coarse field, which is all that the average over hypotheses needs."""
+def _coarse(mean: MeanFunction, points: Array) -> tuple[NDArray[np.float32], Array | None]:
+    """Logits (n,) at points (n, 3), and the distances (n,), metres, to the surface of a placed
+    shape, None of another: from its coarse field, which is all that averages over hypotheses
+    need."""
     if isinstance(mean, PlacedShape):
         distance = mean.signed_distance(points, 0.0)
-        return np.clip(-distance / mean.width, -mean.limit, mean.limit).astype(np.float32)
-    return mean.logits(points)
+        logits = np.clip(-distance / mean.width, -mean.limit, mean.limit)
+        return logits.astype(np.float32), np.abs(distance)
+    return mean.logits(points), None
