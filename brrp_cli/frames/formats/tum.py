@@ -77,9 +77,7 @@ def _pairs(folder: Path) -> list[tuple[str, str, str]]:
 def _listed(path: Path) -> list[tuple[str, str]]:
     """(time, file) of each line that is no comment. Errors: FrameError."""
     try:
-        lines = path.read_text(encoding="utf-8").splitlines()
-        rows = [line.split() for line in lines if line.strip() and not line.startswith("#")]
-        return sorted(((row[0], row[1]) for row in rows), key=lambda row: float(row[0]))
+        return sorted(((row[0], row[1]) for row in _rows(path)), key=lambda row: float(row[0]))
     except (OSError, ValueError, IndexError) as error:
         raise FrameError(
             "The list cannot be read",
@@ -87,6 +85,12 @@ def _listed(path: Path) -> list[tuple[str, str]]:
             expected="lines of a time in seconds and a file",
             found=f"{type(error).__name__}: {error}",
         ) from error
+
+
+def _rows(path: Path) -> list[list[str]]:
+    """The words of each line that is no comment. Errors: OSError, ValueError."""
+    lines = path.read_text(encoding="utf-8").splitlines()
+    return [line.split() for line in lines if line.strip() and not line.startswith("#")]
 
 
 def _intrinsics(folder: Path, request: Request) -> NDArray[np.float64]:
@@ -113,10 +117,10 @@ def _pose(path: Path, time: float) -> NDArray[np.float64] | None:
         return None
     rotation = import_library("scipy.spatial.transform").Rotation
     try:
-        rows = np.atleast_2d(np.loadtxt(path, comments="#", dtype=np.float64))
-        if rows.shape[1] != 8:
-            raise ValueError(f"{rows.shape[1]} columns")
-        near = rows[np.argmin(np.abs(rows[:, 0] - time))]
+        poses = np.array(_rows(path), dtype=np.float64)
+        if poses.ndim != 2 or poses.shape[1] != 8:
+            raise ValueError(f"{len(poses)} lines, not all of 8 numbers")
+        near = poses[np.argmin(np.abs(poses[:, 0] - time))]
         if not abs(near[0] - time) <= _APART:
             return None
         T = np.eye(4)
