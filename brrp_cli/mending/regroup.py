@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
-from functools import cache, partial
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +16,6 @@ from brrp_cli.mending.again import Again, replaced
 from brrp_cli.mending.explain import explained
 from brrp_cli.prior.store import Prior
 from brrp_cli.reconstruction import ObjectReconstruction, Reconstruction
-from brrp_cli.segmentation.cut import boundary_of
 from brrp_cli.segmentation.other_masks import OtherMask, other_masks, painted
 
 
@@ -47,10 +46,9 @@ def regroup(
     # A method that weighs no placements recognises nothing.
     if not any(each.unknown_weight is not None for each in result.objects):
         return result
-    boundary = cache(partial(boundary_of, result.frame, config))
     for _ in range(config.regroup.rounds):
         before = result
-        result = _one_round(before, prior, again, config, boundary, aside, asked, first_free)
+        result = _one_round(before, prior, again, config, aside, asked, first_free)
         if result is before:
             break
         old = {each.object_id: each for each in before.objects}
@@ -64,7 +62,6 @@ def _one_round(
     prior: Prior,
     again: Again,
     config: SegmentConfig,
-    boundary: Callable[[], NDArray[np.float64]],
     aside: NDArray[np.integer] | None,
     asked: Collection[int] | None,
     first_free: int,
@@ -77,7 +74,7 @@ def _one_round(
     ]
     # What has the shape of a stored object, stretched, is one thing.
     whole = [each.object_id for each in result.objects if each.like is not None]
-    masks = other_masks(frame, doubtful, aside, config, result.seed, whole, boundary)
+    masks = other_masks(frame, doubtful, aside, config, result.seed, whole)
     found: list[_Found] = []
     tried: list[ObjectReconstruction] = []
     if masks:

@@ -94,9 +94,10 @@ def largest_plane(
     if not length > 0:  # no three of the drawn points span a plane
         return None
     model = np.asarray(model) / length
-    for _ in range(2):
-        inliers = points[np.abs(points @ model[:3] + model[3]) < tolerance]
-        if len(inliers) < min_points:
+    # From a few points nearly to where it lies, and from all of them once.
+    for some in (drawn, points):
+        inliers = some[np.abs(some @ model[:3] + model[3]) < tolerance]
+        if len(inliers) < (min_points if some is points else 3):
             return None
         middle = inliers.mean(axis=0)
         spread = inliers - middle

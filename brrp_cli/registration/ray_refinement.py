@@ -16,11 +16,11 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from brrp_cli.config import RayRefinementConfig, SensorConfig
-from brrp_cli.dependencies import import_open3d
-from brrp_cli.geometry import transform_points
+from brrp_cli.geometry import normalise, transform_points
 from brrp_cli.observation.sensor_noise import depth_deviation
 from brrp_cli.observation.support_plane import Plane
 from brrp_cli.prior.shape import StoredShape
+from brrp_cli.registration.ray_loops import pull_of_rays
 
 Array = NDArray[np.float64]
 
@@ -44,27 +44,21 @@ def refine_by_rays(
     metres, standard deviation of the mean depth of a patch (observation/sensor_noise.py)
     others : what other views measured, each from a camera of its own
     """
-    points = np.asarray(observed[: config.points], dtype=np.float64)
+    own = OtherRays(observed, focal_length, wave, np.eye(4))
+    views = [_looked_up(view, sensor, config) for view in (own, *others)]
     middle = transform_points(T_cam_shape, shape.vertices.mean(axis=0, keepdims=True))[0]
     T = T_cam_shape.copy()
     for _ in range(config.steps):
-        parts = [_ray_rows(T, shape, points, middle, focal_length, wave, sensor)]
-        parts += [_other_rows(T, shape, other, middle, sensor, config) for other in others]
-        rows, residuals, deviations = (np.concatenate(each) for each in zip(*parts, strict=True))
-        rays = len(rows)
+        normal = np.diag([config.turn**-2] * 3 + [config.shift**-2] * 3)
+        fall = np.zeros(6)
+        for view in views:
+            more = _of_view(T, shape, view, middle, config)
+            normal, fall = normal + more[0], fall + more[1]
         if plane is not None:
-            standing = _standing_row(T, shape, plane, middle, config)
-            rows = np.concatenate([rows, standing[0]])
-            residuals = np.concatenate([residuals, standing[1]])
-            deviations = np.concatenate([deviations, standing[2]])
-        # Tukey's biweight: what belongs to something else does not pull at all.
-        share = np.clip(1 - (residuals / (config.outlier * deviations)) ** 2, 0, None) ** 2
-        weight = share / deviations**2
-        weight[:rays] *= config.independent
-        normal = (rows * weight[:, None]).T @ rows
-        normal += np.diag([config.turn**-2] * 3 + [config.shift**-2] * 3)
-        step = np.linalg.solve(normal, rows.T @ (weight * residuals))
-        T = _moved(T, np.asarray(step, dtype=np.float64), middle)
+            more = _of_standing(T, shape, plane, middle, config)
+            normal, fall = normal + more[0], fall + more[1]
+        step = np.linalg.solve(normal, fall)
+        T = _moved(T, step, middle)
         if np.abs(step).max() < config.still:
             break
     return T if _small(T, T_cam_shape, middle, config) else T_cam_shape
@@ -82,74 +76,71 @@ class OtherRays:
     T_view_cam: Array
 
 
-def _other_rows(
-    T: Array,
-    shape: StoredShape,
-    view: OtherRays,
-    middle: Array,
-    sensor: SensorConfig,
-    config: RayRefinementConfig,
-) -> tuple[Array, Array, Array]:
-    """`_ray_rows` of another view, by turn and shift in this frame."""
+@dataclass(frozen=True)
+class _View:
+    """points : (n, 3) metres, in the view's own camera frame; along : (n,) metres, standard
+    deviation of each along its ray; pixel : its width at one metre; T_view_cam : as in
+    `OtherRays`"""
+
+    points: Array
+    along: Array
+    pixel: float
+    T_view_cam: Array
+
+
+def _looked_up(view: OtherRays, sensor: SensorConfig, config: RayRefinementConfig) -> _View:
+    """What stays the same in all steps."""
     points = np.asarray(view.points[: config.points], dtype=np.float64)
-    rows, residuals, deviations = _ray_rows(
-        view.T_view_cam @ T,
-        shape,
-        points,
-        np.asarray(transform_points(view.T_view_cam, middle), dtype=np.float64),
-        view.focal_length,
-        view.wave,
-        sensor,
-    )
-    R = view.T_view_cam[:3, :3]
-    # Row vectors: a product with R takes them from the view's axes to this frame's.
-    return np.concatenate([rows[:, :3] @ R, rows[:, 3:] @ R], axis=1), residuals, deviations
+    along = np.hypot(depth_deviation(points[:, 2], sensor), view.wave)
+    return _View(points, along, 1 / view.focal_length, view.T_view_cam)
 
 
-def _ray_rows(
-    T: Array,
-    shape: StoredShape,
-    points: Array,
-    middle: Array,
-    focal_length: float,
-    wave: float,
-    sensor: SensorConfig,
-) -> tuple[Array, Array, Array]:
-    """Derivatives (n, 6) by turn and shift, residuals (n,), metres along the surface's normal, of
-    points from where their rays meet the shape, and the residuals' standard deviations (n,).
+def _of_view(
+    T: Array, shape: StoredShape, view: _View, middle: Array, config: RayRefinementConfig
+) -> tuple[Array, Array]:
+    """Normal equations (6, 6) and (6,) of the turn and shift, camera frame, that bring the shape to
+    a view's points, along the normals where their rays meet it.
 
     A ray that misses the shape is held against its nearest point.
     """
+    points, T_view_shape = view.points, view.T_view_cam @ T
     # Rays end at the points: one that ends on the surface goes once.
-    length, away = shape.met(T, points)
+    length, away = shape.met(T_view_shape, points)
     met = np.isfinite(length)
     on_surface = points * np.where(met, length, 1.0)[:, None]
     missed = np.flatnonzero(~met)
     if len(missed):
-        local = transform_points(np.linalg.inv(T), points[missed])
-        query = import_open3d().core.Tensor(local.astype(np.float32))
-        closest = shape.scene.compute_closest_points(query, nthreads=1)["points"].numpy()
-        on_surface[missed] = transform_points(T, closest.astype(np.float64))
-        apart = points[missed] - on_surface[missed]
-        away[missed] = apart / np.maximum(np.linalg.norm(apart, axis=1, keepdims=True), 1e-9)
-    residuals = np.einsum("ni,ni->n", points - on_surface, away)
-    rows = np.concatenate([np.cross(on_surface - middle, away), away], axis=1)
-    cosine = np.einsum("ni,ni->n", points, away) / np.linalg.norm(points, axis=1)
-    along = np.hypot(depth_deviation(points[:, 2], sensor), wave) * cosine
-    across = points[:, 2] / focal_length * np.sqrt(np.clip(1 - cosine**2, 0, 1))
-    return rows, residuals, np.hypot(along, across)
+        closest, _ = shape.closest(transform_points(np.linalg.inv(T_view_shape), points[missed]))
+        on_surface[missed] = transform_points(T_view_shape, closest)
+        away[missed] = normalise(points[missed] - on_surface[missed])
+    normal, fall = pull_of_rays(
+        points,
+        on_surface,
+        away,
+        np.asarray(transform_points(view.T_view_cam, middle), dtype=np.float64),
+        view.along,
+        view.pixel,
+        config.outlier,
+        config.independent,
+    )
+    # From the view's axes to this frame's.
+    turn = np.kron(np.eye(2), view.T_view_cam[:3, :3])
+    return turn.T @ normal @ turn, turn.T @ fall
 
 
-def _standing_row(
+def _of_standing(
     T: Array, shape: StoredShape, plane: Plane, middle: Array, config: RayRefinementConfig
-) -> tuple[Array, Array, Array]:
+) -> tuple[Array, Array]:
     """The same of the shape's lowest point, which touches the plane where the object stands on it;
     far above it, Tukey's biweight lets go."""
-    vertices = transform_points(T, shape.vertices.astype(np.float64))
-    height = vertices @ plane.normal + plane.offset
-    lowest = int(np.argmin(height))
-    row = np.concatenate([np.cross(vertices[lowest] - middle, plane.normal), plane.normal])
-    return row[None], np.array([-height[lowest]]), np.array([config.standing])
+    down = (T[:3, :3].T @ plane.normal).astype(np.float32)
+    lowest = shape.vertices[int(np.argmin(shape.vertices @ down))].astype(np.float64)
+    at = np.asarray(transform_points(T, lowest), dtype=np.float64)
+    row = np.concatenate([np.cross(at - middle, plane.normal), plane.normal])
+    height = at @ plane.normal + plane.offset
+    share = max(0.0, 1 - (height / (config.outlier * config.standing)) ** 2) ** 2
+    weight = share / config.standing**2
+    return weight * np.outer(row, row), -weight * height * row
 
 
 def _moved(T: Array, step: Array, middle: Array) -> Array:

@@ -11,25 +11,27 @@ from brrp_cli.config.segmentation import SegmentConfig
 from brrp_cli.dependencies import import_library
 from brrp_cli.errors import FrameError
 from brrp_cli.frames.frame import Frame
+from brrp_cli.frames.last_frame import kept_for_last_image
 from brrp_cli.geometry import backproject
 from brrp_cli.segmentation.agglomerate import borders_of
 from brrp_cli.segmentation.components import find_parts, split_at_strongest
 from brrp_cli.segmentation.concave_edges import depth_jumps, hollow_creases, surface_normals
-from brrp_cli.segmentation.learned_affinities import affinities_of, shipped
+from brrp_cli.segmentation.learned_affinities import affinities_in
 from brrp_cli.segmentation.seen_surfaces import see_surfaces, smoothed
 
 log = logging.getLogger(__name__)
 
 
-def boundary_of(frame: Frame, config: SegmentConfig) -> NDArray[np.float64]:
+@kept_for_last_image
+def boundary_of(frame: Frame, seed: int, config: SegmentConfig) -> NDArray[np.float64]:
     """Where one thing ends (H, W), 0 to 1: jumps of depth, and borders that the network sees, or
     hollow creases where there is no table, which it needs."""
     try:
-        seen = see_surfaces(frame, 0, config)
+        seen = see_surfaces(frame, seed, config)
     except FrameError:
         log.info("No table is seen: masks are cut at jumps of depth and hollow creases alone")
         return _without_a_table(frame, config)
-    affinities = affinities_of(frame.rgb, seen, shipped(), config.affinities.colour)
+    affinities = affinities_in(frame, seen, config.affinities)
     return np.maximum(affinities.enlarge(borders_of(affinities)), seen.jumps)
 
 

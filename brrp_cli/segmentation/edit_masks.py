@@ -48,7 +48,7 @@ def split(
     if mask.sum() < pieces:
         raise FrameError("The object has too few points with depth", where=frame.source)
     config = config or SegmentConfig()
-    parts = cut_at_strongest(mask, boundary_of(frame, config), pieces, config)
+    parts = cut_at_strongest(mask, boundary_of(frame, seed, config), pieces, config)
     if parts is None:
         log.info("Object %d has no such boundary inside: it is cut by nearness", object_id)
         parts = _by_nearness(frame, mask, pieces, seed)

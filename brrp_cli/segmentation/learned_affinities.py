@@ -15,6 +15,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from brrp_cli.config.segmentation import AffinitiesConfig
+from brrp_cli.frames.frame import Frame
+from brrp_cli.frames.last_frame import kept_for_last_image
 from brrp_cli.network_files import load_network, save_network
 from brrp_cli.segmentation.image_channels import COLOURS, image_channels, step_of
 from brrp_cli.segmentation.seen_surfaces import SeenSurfaces
@@ -59,6 +62,12 @@ class Affinities:
     def _window(self) -> tuple[slice, slice]:
         rows, columns = self.object.shape
         return np.s_[: rows * self.step, : columns * self.step]
+
+
+@kept_for_last_image
+def affinities_in(frame: Frame, seen: SeenSurfaces, config: AffinitiesConfig) -> Affinities:
+    """What the network that comes with the package says of a frame and the surfaces seen in it."""
+    return affinities_of(frame.rgb, seen, shipped(), config.colour)
 
 
 def affinities_of(

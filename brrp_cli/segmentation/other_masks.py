@@ -6,7 +6,7 @@ one of these masks can.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from itertools import count, product
 
@@ -38,21 +38,19 @@ def other_masks(
     config: SegmentConfig,
     seed: int = 0,
     whole: Collection[int] = (),
-    boundary: Callable[[], NDArray[np.float64]] | None = None,
 ) -> list[OtherMask]:
     """Masks of what was left out, `aside` (H, W); unions of the masks `ids` with their neighbours,
     all of them and two by two; and parts of each, by its inner boundary and by colour.
     `config.regroup.most` of them at most.
 
-    whole : ids of masks that are not cut; boundary : gives that of the frame (cut.py), which is the
-    same with any masks; None = it is looked for
+    whole : ids of masks that are not cut
     """
     own = config.regroup
     found = [] if aside is None else _left_out(frame, aside)
     found += [OtherMask(np.isin(frame.segmap, list(of)), of) for of in unions(frame, ids, own)]
     large = [i for i in ids if i not in whole and _size(frame, frame.segmap == i) >= own.least_cut]
     if large:
-        edges = boundary_of(frame, config) if boundary is None else boundary()
+        edges = boundary_of(frame, seed, config)
         for i in large:
             rng = child_rng(seed, "colour groups", i)
             found += [

@@ -8,9 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brrp_cli.config.segmentation import AffinitiesConfig
+from brrp_cli.frames.frame import Frame
 from brrp_cli.segmentation.agglomerate import borders_of, join_alike_pixels
 from brrp_cli.segmentation.components import find_parts
-from brrp_cli.segmentation.learned_affinities import affinities_of, shipped
+from brrp_cli.segmentation.learned_affinities import affinities_in
 from brrp_cli.segmentation.seen_surfaces import SeenSurfaces
 
 
@@ -23,14 +24,14 @@ class Parted:
 
 
 def part_objects(
-    rgb: NDArray[np.uint8],
+    frame: Frame,
     seen: SeenSurfaces,
     risen: NDArray[np.bool_],
     config: AffinitiesConfig,
 ) -> Parted:
     """Objects in what has `risen` (H, W) from the table, without what the network takes for depth
-    that bled. rgb : (H, W, 3)"""
-    affinities = affinities_of(rgb, seen, shipped(), config.colour)
+    that bled."""
+    affinities = affinities_in(frame, seen, config)
     mask = affinities.sample(risen) & (affinities.object > config.least)
     border = borders_of(affinities)
     parts = find_parts(mask, border, config.components)

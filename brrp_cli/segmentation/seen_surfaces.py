@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from brrp_cli.config.segmentation import SegmentConfig
 from brrp_cli.errors import FrameError
 from brrp_cli.frames.frame import Frame
+from brrp_cli.frames.last_frame import kept_for_last_image
 from brrp_cli.geometry import backproject
 from brrp_cli.segmentation.concave_edges import depth_jumps, hollow_angles, surface_normals
 from brrp_cli.segmentation.smooth_depth import flying_pixels, smooth_depth
@@ -42,6 +43,7 @@ class SeenSurfaces:
     jumps: NDArray[np.bool_]
 
 
+@kept_for_last_image
 def see_surfaces(frame: Frame, seed: int, config: SegmentConfig) -> SeenSurfaces:
     """What `frame` shows. Errors: FrameError if it has too little depth, or no table."""
     depth = smoothed(frame, config)

@@ -55,7 +55,7 @@ def segment_and_aside(
     seen = see_surfaces(frame, seed, config)
     points, table = seen.points, seen.table
     rises = rising(seen, config)
-    parted = part_objects(frame.rgb, seen, rises.risen, config.affinities)
+    parted = part_objects(frame, seen, rises.risen, config.affinities)
     objects = join_insides(
         parted.labels, seen.plan, seen.height, table.plan(seen.normals), config.insides
     )

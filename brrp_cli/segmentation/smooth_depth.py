@@ -12,14 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brrp_cli.config.segmentation import SmoothDepthConfig
+from brrp_cli.segmentation.average_loops import averaged
 
 Array = NDArray[np.float32]
 
 # Inverse depth of a pixel without any: no surface is so near, so that it agrees with no neighbour.
 _MISSING = np.float32(1e6)
-# Beyond it float32 holds the Gaussian as a denormal number, which is slow, or not at all.
-_FARTHEST = np.float32(80.0)
-_BAND = 48
 
 
 def smooth_depth(depth: NDArray[np.floating], config: SmoothDepthConfig) -> NDArray[np.float64]:
@@ -27,7 +25,8 @@ def smooth_depth(depth: NDArray[np.floating], config: SmoothDepthConfig) -> NDAr
     inverse, missing = _inverse(depth)
     scale = np.float32(0.5**0.5) / (2 * _noise(inverse, config))
     for _ in range(config.rounds):
-        inverse = _averaged(inverse, scale, config.radius)
+        padded = np.pad(inverse, config.radius, constant_values=_MISSING)
+        inverse = averaged(padded, scale, config.radius)
         inverse[missing] = _MISSING
     return np.where(missing, np.nan, 1.0 / inverse.astype(np.float64))
 
@@ -66,30 +65,3 @@ def _inverse(depth: NDArray[np.floating]) -> tuple[Array, NDArray[np.bool_]]:
 def _noise(inverse: Array, config: SmoothDepthConfig) -> Array:
     """Deviation of inverse depth (H, W), 1 / metres."""
     return np.maximum(np.float32(config.noise), np.float32(config.floor) * inverse**2)
-
-
-def _averaged(inverse: Array, scale: Array, radius: int) -> Array:
-    """The mean (H, W) of neighbours, by the Gaussian of their difference times scale (H, W)."""
-    padded = np.pad(inverse, radius, constant_values=_MISSING)
-    averaged = np.empty_like(inverse)
-    width = inverse.shape[1]
-    # Band by band: what is read and written 48 times stays in the cache.
-    for top in range(0, len(inverse), _BAND):
-        own, by = inverse[top : top + _BAND], -np.square(scale[top : top + _BAND])
-        total, weights = np.zeros_like(own), np.ones_like(own)
-        difference, weight = np.empty_like(own), np.empty_like(own)
-        for row, column in np.ndindex(2 * radius + 1, 2 * radius + 1):
-            if row == radius and column == radius:
-                continue
-            window = np.s_[top + row : top + row + len(own), column : column + width]
-            np.subtract(padded[window], own, out=difference)
-            np.square(difference, out=weight)
-            np.multiply(weight, by, out=weight)
-            np.maximum(weight, -_FARTHEST, out=weight)
-            np.exp(weight, out=weight)
-            weights += weight
-            # Of the difference, which is small: float32 keeps what it means.
-            weight *= difference
-            total += weight
-        averaged[top : top + _BAND] = own + total / weights
-    return averaged
