@@ -218,7 +218,8 @@ class TrialConfig:
 class RayRefinementConfig:
     """The last step of a placement, by casting the rays of `points` observed points into the mesh.
 
-    `steps` steps of Gauss-Newton at most, fewer where one turns and moves by less than `still`.
+    `steps` steps of Gauss-Newton at most, fewer where one turns and moves by less than `still`, or
+    where `patience` of them, one after the other, gain less than `gain` nats.
     Residuals beyond `outlier` standard deviations do not pull; of the others a share `independent`
     counts, since neighbouring pixels err together. turn, shift : radians and metres by which a
     placement is off before that step; standing : metres, standard deviation of the height at which
@@ -229,6 +230,8 @@ class RayRefinementConfig:
     points: int = 1000
     steps: int = 12
     still: float = 2e-5
+    gain: float = 0.05
+    patience: int = 2
     outlier: float = 3.0
     independent: float = share(0.05)
     turn: float = 0.05

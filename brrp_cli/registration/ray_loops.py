@@ -22,8 +22,8 @@ def pull_of_rays(
     pixel: float,
     outlier: float,
     independent: float,
-) -> tuple[Array, Array]:
-    """Normal equations, (6, 6) and (6,), of the turn about `middle` (3,), radians, and the shift,
+) -> tuple[float, Array, Array]:
+    """What the residuals cost, nats, and the normal equations, (6, 6) and (6,), of the turn about `middle` (3,), radians, and the shift,
     metres, that bring a surface to observed points (n, 3), camera frame.
 
     on_surface, away : (n, 3) where each point's ray meets it, and its unit normal there; along :
@@ -32,7 +32,7 @@ def pull_of_rays(
     independent : the share of the points that counts
     """
     normal, fall = np.zeros((6, 6)), np.zeros(6)
-    row = np.empty(6)
+    row, cost, most = np.empty(6), 0.0, outlier * outlier / 6
     for n in range(len(points)):
         p, s, a = points[n], on_surface[n], away[n]
         residual = (p[0] - s[0]) * a[0] + (p[1] - s[1]) * a[1] + (p[2] - s[2]) * a[2]
@@ -42,8 +42,9 @@ def pull_of_rays(
         through = along[n] * cosine
         across = p[2] * pixel
         variance = through * through + across * across * max(0.0, 1 - cosine * cosine)
-        share = 1 - residual * residual / (outlier * outlier * variance)
-        if share <= 0:
+        share = max(0.0, 1 - residual * residual / (outlier * outlier * variance))
+        cost += independent * most * (1 - share * share * share)
+        if share == 0:
             continue
         weight = independent * share * share / variance
         x, y, z = s[0] - middle[0], s[1] - middle[1], s[2] - middle[2]
@@ -53,4 +54,4 @@ def pull_of_rays(
             fall[i] += weight * row[i] * residual
             for j in range(6):
                 normal[i, j] += weight * row[i] * row[j]
-    return normal, fall
+    return cost, normal, fall

@@ -47,21 +47,29 @@ def refine_by_rays(
     own = OtherRays(observed, focal_length, wave, np.eye(4))
     views = [_looked_up(view, sensor, config) for view in (own, *others)]
     middle = transform_points(T_cam_shape, shape.vertices.mean(axis=0, keepdims=True))[0]
-    T = T_cam_shape.copy()
-    for _ in range(config.steps):
-        normal = np.diag([config.turn**-2] * 3 + [config.shift**-2] * 3)
-        fall = np.zeros(6)
-        for view in views:
-            more = _of_view(T, shape, view, middle, config)
-            normal, fall = normal + more[0], fall + more[1]
+
+    def pulled(T: Array) -> _Pull:
+        parts = [_of_view(T, shape, view, middle, config) for view in views]
         if plane is not None:
-            more = _of_standing(T, shape, plane, middle, config)
-            normal, fall = normal + more[0], fall + more[1]
-        step = np.linalg.solve(normal, fall)
+            parts.append(_of_standing(T, shape, plane, middle, config))
+        return _Pull(*(sum(each) for each in zip(*parts, strict=True)))
+
+    before = np.diag([config.turn**-2] * 3 + [config.shift**-2] * 3)
+    T = best = T_cam_shape
+    at = pulled(T)
+    least, since = at.cost, 0
+    for _ in range(config.steps):
+        step = np.linalg.solve(at.normal + before, at.fall)
         T = _moved(T, step, middle)
-        if np.abs(step).max() < config.still:
+        at = pulled(T)
+        # Facets and silhouettes make the residuals jump: a step that makes it worse may lead on.
+        since = 0 if at.cost < least - config.gain else since + 1
+        # Of those that are as good the last: it is nearer to where the pulls are in balance.
+        if at.cost < least + config.gain:
+            best, least = T, min(least, at.cost)
+        if since == config.patience or np.abs(step).max() < config.still:
             break
-    return T if _small(T, T_cam_shape, middle, config) else T_cam_shape
+    return best if _small(best, T_cam_shape, middle, config) else T_cam_shape
 
 
 @dataclass(frozen=True)
@@ -74,6 +82,16 @@ class OtherRays:
     focal_length: float
     wave: float
     T_view_cam: Array
+
+
+@dataclass(frozen=True)
+class _Pull:
+    """cost : of all residuals, nats; normal, fall : (6, 6) and (6,), the normal equations of turn
+    and shift, camera frame"""
+
+    cost: float
+    normal: Array
+    fall: Array
 
 
 @dataclass(frozen=True)
@@ -97,9 +115,8 @@ def _looked_up(view: OtherRays, sensor: SensorConfig, config: RayRefinementConfi
 
 def _of_view(
     T: Array, shape: StoredShape, view: _View, middle: Array, config: RayRefinementConfig
-) -> tuple[Array, Array]:
-    """Normal equations (6, 6) and (6,) of the turn and shift, camera frame, that bring the shape to
-    a view's points, along the normals where their rays meet it.
+) -> tuple[float, Array, Array]:
+    """`_Pull` of a view's points on the shape, along the normals where their rays meet it.
 
     A ray that misses the shape is held against its nearest point.
     """
@@ -113,7 +130,7 @@ def _of_view(
         closest, _ = shape.closest(transform_points(np.linalg.inv(T_view_shape), points[missed]))
         on_surface[missed] = transform_points(T_view_shape, closest)
         away[missed] = normalise(points[missed] - on_surface[missed])
-    normal, fall = pull_of_rays(
+    cost, normal, fall = pull_of_rays(
         points,
         on_surface,
         away,
@@ -125,12 +142,12 @@ def _of_view(
     )
     # From the view's axes to this frame's.
     turn = np.kron(np.eye(2), view.T_view_cam[:3, :3])
-    return turn.T @ normal @ turn, turn.T @ fall
+    return cost, turn.T @ normal @ turn, turn.T @ fall
 
 
 def _of_standing(
     T: Array, shape: StoredShape, plane: Plane, middle: Array, config: RayRefinementConfig
-) -> tuple[Array, Array]:
+) -> tuple[float, Array, Array]:
     """The same of the shape's lowest point, which touches the plane where the object stands on it;
     far above it, Tukey's biweight lets go."""
     down = (T[:3, :3].T @ plane.normal).astype(np.float32)
@@ -138,9 +155,10 @@ def _of_standing(
     at = np.asarray(transform_points(T, lowest), dtype=np.float64)
     row = np.concatenate([np.cross(at - middle, plane.normal), plane.normal])
     height = at @ plane.normal + plane.offset
-    share = max(0.0, 1 - (height / (config.outlier * config.standing)) ** 2) ** 2
-    weight = share / config.standing**2
-    return weight * np.outer(row, row), -weight * height * row
+    share = max(0.0, 1 - (height / (config.outlier * config.standing)) ** 2)
+    cost = config.outlier**2 / 6 * (1 - share**3)
+    weight = share**2 / config.standing**2
+    return cost, weight * np.outer(row, row), -weight * height * row
 
 
 def _moved(T: Array, step: Array, middle: Array) -> Array:
