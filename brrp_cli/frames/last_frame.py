@@ -41,6 +41,10 @@ class _Answer(Generic[R]):
     args: tuple[object, ...]
     value: R
 
+    def answers(self, of: tuple[object, ...], args: tuple[object, ...]) -> bool:
+        """Whether it is the one to this question."""
+        return _same(tuple(each() for each in self.of), of) and _same(self.args, args)
+
 
 def _kept(
     function: Callable[Concatenate[Frame, P], R],
@@ -55,9 +59,8 @@ def _kept(
         if kwargs:
             return function(frame, *args, **kwargs)
         known, of = last, parts(frame)
-        if known is not None and _same(tuple(each() for each in known.of), of):
-            if _same(known.args, args):
-                return known.value
+        if known is not None and known.answers(of, args):
+            return known.value
         answer = function(frame, *args, **kwargs)
 
         def forget(part: object) -> None:

@@ -23,8 +23,9 @@ def pull_of_rays(
     outlier: float,
     independent: float,
 ) -> tuple[float, Array, Array]:
-    """What the residuals cost, nats, and the normal equations, (6, 6) and (6,), of the turn about `middle` (3,), radians, and the shift,
-    metres, that bring a surface to observed points (n, 3), camera frame.
+    """What the residuals cost, nats, and the normal equations, (6, 6) and (6,), of the turn about
+    `middle` (3,), radians, and the shift, metres, that bring a surface to observed points (n, 3),
+    camera frame.
 
     on_surface, away : (n, 3) where each point's ray meets it, and its unit normal there; along :
     (n,) metres, standard deviation of a point along its ray; pixel : its width at one metre

@@ -52,7 +52,8 @@ def refine_by_rays(
         parts = [_of_view(T, shape, view, middle, config) for view in views]
         if plane is not None:
             parts.append(_of_standing(T, shape, plane, middle, config))
-        return _Pull(*(sum(each) for each in zip(*parts, strict=True)))
+        costs, normals, falls = zip(*parts, strict=True)
+        return _Pull(sum(costs), np.sum(normals, axis=0), np.sum(falls, axis=0))
 
     before = np.diag([config.turn**-2] * 3 + [config.shift**-2] * 3)
     T = best = T_cam_shape
@@ -60,7 +61,7 @@ def refine_by_rays(
     least, since = at.cost, 0
     for _ in range(config.steps):
         step = np.linalg.solve(at.normal + before, at.fall)
-        T = _moved(T, step, middle)
+        T = _moved(T, np.asarray(step, dtype=np.float64), middle)
         at = pulled(T)
         # Facets and silhouettes make the residuals jump: a step that makes it worse may lead on.
         since = 0 if at.cost < least - config.gain else since + 1
@@ -154,7 +155,7 @@ def _of_standing(
     lowest = shape.vertices[int(np.argmin(shape.vertices @ down))].astype(np.float64)
     at = np.asarray(transform_points(T, lowest), dtype=np.float64)
     row = np.concatenate([np.cross(at - middle, plane.normal), plane.normal])
-    height = at @ plane.normal + plane.offset
+    height = float(at @ plane.normal + plane.offset)
     share = max(0.0, 1 - (height / (config.outlier * config.standing)) ** 2)
     cost = config.outlier**2 / 6 * (1 - share**3)
     weight = share**2 / config.standing**2

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from brrp_cli.frames.frame import Frame
-from brrp_cli.frames.last_frame import kept_for_last_frame
+from brrp_cli.frames.last_frame import kept_for_last_frame, kept_for_last_image
 
 
 @pytest.fixture
@@ -54,6 +54,37 @@ def test_a_frame_is_not_kept_alive(frame, counted):
     del other
     gc.collect()
     assert gone() is None
+
+
+class Answer:
+    """Something that can be seen to be gone."""
+
+
+@pytest.mark.parametrize("kept", [kept_for_last_frame, kept_for_last_image])
+def test_the_answer_goes_with_the_frame(frame, kept):
+    asked = kept(lambda frame: Answer())
+    other = replace(frame)
+    answer = weakref.ref(asked(other))
+    assert answer() is asked(other)
+    del other
+    gc.collect()
+    assert answer() is None
+
+
+def test_other_masks_of_an_image_are_the_same_question_and_another_image_is_not(frame):
+    calls = []
+
+    @kept_for_last_image
+    def mean_colour(frame):
+        calls.append(frame)
+        return float(frame.rgb.mean())
+
+    masked = frame.with_masks(np.ones((4, 5), np.int64))
+    assert mean_colour(frame) == mean_colour(masked) == 0
+    assert len(calls) == 1
+    assert mean_colour(replace(frame, rgb=frame.rgb + np.uint8(7))) == 7
+    mean_colour(frame.with_points(frame.points / 2))
+    assert len(calls) == 3
 
 
 def test_depth_is_that_of_the_points_in_one_piece_and_cannot_be_changed(frame):
