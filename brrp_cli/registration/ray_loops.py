@@ -28,7 +28,8 @@ def pull_of_rays(
     camera frame.
 
     on_surface, away : (n, 3) where each point's ray meets it, and its unit normal there; along :
-    (n,) metres, standard deviation of a point along its ray; pixel : its width at one metre
+    (n,) metres, standard deviation of a point along its ray; pixel : the width of one, metres, at
+    one metre
     outlier : standard deviations beyond which a point does not pull (Tukey's biweight);
     independent : the share of the points that counts
     """

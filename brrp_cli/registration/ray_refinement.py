@@ -23,6 +23,8 @@ from brrp_cli.prior.shape import StoredShape
 from brrp_cli.registration.ray_loops import pull_of_rays
 
 Array = NDArray[np.float64]
+# What residuals cost, nats, and the normal equations, (6, 6) and (6,), of turn and shift.
+Pull = tuple[float, Array, Array]
 
 
 def refine_by_rays(
@@ -48,26 +50,26 @@ def refine_by_rays(
     views = [_looked_up(view, sensor, config) for view in (own, *others)]
     middle = transform_points(T_cam_shape, shape.vertices.mean(axis=0, keepdims=True))[0]
 
-    def pulled(T: Array) -> _Pull:
+    def pull(T: Array) -> Pull:
         parts = [_of_view(T, shape, view, middle, config) for view in views]
         if plane is not None:
             parts.append(_of_standing(T, shape, plane, middle, config))
         costs, normals, falls = zip(*parts, strict=True)
-        return _Pull(sum(costs), np.sum(normals, axis=0), np.sum(falls, axis=0))
+        return sum(costs), np.sum(normals, axis=0), np.sum(falls, axis=0)
 
     before = np.diag([config.turn**-2] * 3 + [config.shift**-2] * 3)
     T = best = T_cam_shape
-    at = pulled(T)
-    least, since = at.cost, 0
+    cost, normal, fall = pull(T)
+    least, since = cost, 0
     for _ in range(config.steps):
-        step = np.linalg.solve(at.normal + before, at.fall)
+        step = np.linalg.solve(normal + before, fall)
         T = _moved(T, np.asarray(step, dtype=np.float64), middle)
-        at = pulled(T)
+        cost, normal, fall = pull(T)
         # Facets and silhouettes make the residuals jump: a step that makes it worse may lead on.
-        since = 0 if at.cost < least - config.gain else since + 1
+        since = 0 if cost < least - config.gain else since + 1
         # Of those that are as good the last: it is nearer to where the pulls are in balance.
-        if at.cost < least + config.gain:
-            best, least = T, min(least, at.cost)
+        if cost < least + config.gain:
+            best, least = T, min(least, cost)
         if since == config.patience or np.abs(step).max() < config.still:
             break
     return best if _small(best, T_cam_shape, middle, config) else T_cam_shape
@@ -86,20 +88,10 @@ class OtherRays:
 
 
 @dataclass(frozen=True)
-class _Pull:
-    """cost : of all residuals, nats; normal, fall : (6, 6) and (6,), the normal equations of turn
-    and shift, camera frame"""
-
-    cost: float
-    normal: Array
-    fall: Array
-
-
-@dataclass(frozen=True)
 class _View:
     """points : (n, 3) metres, in the view's own camera frame; along : (n,) metres, standard
-    deviation of each along its ray; pixel : its width at one metre; T_view_cam : as in
-    `OtherRays`"""
+    deviation of each along its ray; pixel : the width of one, metres, at one metre;
+    T_view_cam : as in `OtherRays`"""
 
     points: Array
     along: Array
@@ -116,8 +108,9 @@ def _looked_up(view: OtherRays, sensor: SensorConfig, config: RayRefinementConfi
 
 def _of_view(
     T: Array, shape: StoredShape, view: _View, middle: Array, config: RayRefinementConfig
-) -> tuple[float, Array, Array]:
-    """`_Pull` of a view's points on the shape, along the normals where their rays meet it.
+) -> Pull:
+    """That of a view's points, in this frame's camera, along the normals where their rays meet the
+    shape.
 
     A ray that misses the shape is held against its nearest point.
     """
@@ -148,8 +141,8 @@ def _of_view(
 
 def _of_standing(
     T: Array, shape: StoredShape, plane: Plane, middle: Array, config: RayRefinementConfig
-) -> tuple[float, Array, Array]:
-    """The same of the shape's lowest point, which touches the plane where the object stands on it;
+) -> Pull:
+    """That of the shape's lowest point, which touches the plane where the object stands on it;
     far above it, Tukey's biweight lets go."""
     down = (T[:3, :3].T @ plane.normal).astype(np.float32)
     lowest = shape.vertices[int(np.argmin(shape.vertices @ down))].astype(np.float64)

@@ -54,6 +54,16 @@ def test_a_placement_that_is_off_ends_at_the_truth(name, shift):
     assert apart(name, T) < 0.0004 < apart(name, start)
 
 
+@pytest.mark.parametrize("name", ["box", "ell", "beaker"])
+def test_a_placement_that_has_come_to_rest_hardly_moves_when_it_is_refined_again(name):
+    points = seen(name)
+    T = refined(
+        name, similarity(translation=np.array([0.001, -0.001, 0.001])) @ truth(name), points
+    )
+    again = refined(name, T, points)
+    assert abs(apart(name, again) - apart(name, T)) < 0.00005
+
+
 def test_a_thin_wall_stands_where_its_near_side_was_seen_and_not_its_middle():
     model = search_model(stored("beaker"))
     points = seen("beaker")
