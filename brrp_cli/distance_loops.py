@@ -18,6 +18,9 @@ Floats = NDArray[np.float32]
 
 # What rounding leaves of a positive number that is next to nothing.
 TINY = 1e-30
+# A ray that is followed through distances: metres that it goes on at least, and how often.
+SHORTEST_STEP = 0.001
+LONGEST_WALK = 60
 
 
 @compiled
@@ -127,6 +130,48 @@ def distances_and_gradients(
             flat, values.shape, spacing, x, y, z
         )
     return found, slope
+
+
+@compiled
+def nearest_along(
+    values: Floats,
+    lower: Array,
+    spacing: float,
+    unit: float,
+    T_model_cam: Array,
+    rays: Array,
+    reach: float,
+) -> tuple[Array, Array]:
+    """Along rays (n, 3) from the camera, z = 1: the least distance to the surface, metres, and the
+    depth where that is, (n,) each; a ray ends where it enters.
+
+    T_model_cam : (4, 4) rigid; unit : metres of one unit of the grid; reach : metres about the
+    model's middle within which rays are followed
+    """
+    least, at = np.empty(len(rays)), np.empty(len(rays))
+    flat = values.ravel()
+    a, b, c = T_model_cam[0, 3], T_model_cam[1, 3], T_model_cam[2, 3]
+    for n in range(len(rays)):
+        dx, dy, dz = (
+            T_model_cam[0, 0] * rays[n, 0] + T_model_cam[0, 1] * rays[n, 1] + T_model_cam[0, 2],
+            T_model_cam[1, 0] * rays[n, 0] + T_model_cam[1, 1] * rays[n, 1] + T_model_cam[1, 2],
+            T_model_cam[2, 0] * rays[n, 0] + T_model_cam[2, 1] * rays[n, 1] + T_model_cam[2, 2],
+        )
+        square = dx * dx + dy * dy + dz * dz
+        middle, half = -(a * dx + b * dy + c * dz) / square, reach / math.sqrt(square)
+        z = max(middle - half, 0.0)
+        least[n], at[n] = np.inf, z
+        for _ in range(LONGEST_WALK):
+            x, y, w = _in_nodes(
+                (a + z * dx) / unit, (b + z * dy) / unit, (c + z * dz) / unit, lower, 1 / spacing
+            )
+            off = _distance(flat, values.shape, spacing, x, y, w) * unit
+            if off < least[n]:
+                least[n], at[n] = off, z
+            z += max(off, SHORTEST_STEP) / math.sqrt(square)
+            if off <= 0 or z > middle + half:
+                break
+    return least, at
 
 
 @compiled

@@ -126,14 +126,19 @@ def left_out(view: View) -> View:
 def without(item: Similarity, row: int) -> Similarity:
     """The evidence without one row of the prior."""
     kept = item.rows != row
-    alignment = item.alignment[kept] if isinstance(item.alignment, np.ndarray) else item.alignment
+
+    def part(values: NDArray[np.float32] | float) -> NDArray[np.float32] | float:
+        return values[kept] if isinstance(values, np.ndarray) else values
+
     return replace(
         item,
         rows=item.rows[kept],
         colour=item.colour[:, kept],
         pairs=item.pairs[kept],
         size=item.size[kept],
-        alignment=alignment,
+        alignment=part(item.alignment),
+        bare=part(item.bare),
+        spilled=part(item.spilled),
     )
 
 

@@ -55,6 +55,26 @@ class VerificationConfig:
 
 
 @dataclass(frozen=True)
+class SilhouetteConfig:
+    """How a placed model's silhouette is held against a mask (registration/silhouette.py).
+
+    edge : pixels at the mask's edge that count for neither side; around : part of the mask's longer
+    side that is looked at beside it, and at least so many pixels; rays, rays_beside : at most
+    near : metres, or so many nodes of the model's distances, within which it covers a ray; touched
+    : metres, within which it reaches into one beside the mask
+    """
+
+    edge: int = 1
+    around: float = 0.4
+    least_around: int = 8
+    rays: int = 200
+    rays_beside: int = 400
+    near: float = 0.002
+    nodes: float = 0.6
+    touched: float = 0.0005
+
+
+@dataclass(frozen=True)
 class ColourConfig:
     """Which of the placements that depth cannot tell apart has the colours of the image.
 

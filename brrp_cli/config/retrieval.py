@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from brrp_cli.config.ranges import between, share
-from brrp_cli.config.registration import SearchConfig
+from brrp_cli.config.registration import SearchConfig, SilhouetteConfig
 
 
 @dataclass(frozen=True)
@@ -70,12 +70,13 @@ class SimilarityConfig:
         seen from one side; size_limit : squared spreads beyond which nothing more speaks against
         it; size_most : what speaks against all three at most, since an object that leans on
         others, or lies on them, stands in no resting pose on the plane
-    `blur` and `size_most` are those of priors whose objects are aligned too
+    `blur`, `least_pairs` and `size_most` are those of priors whose objects are aligned too
     """
 
     neutral_colour: float = share(0.93)
     neutral_pairs: float = share(0.97)
     blur: float = share(0.2)
+    least_pairs: float = share(0.8)
     size_spread: tuple[float, float, float] = (0.006, 0.008, 0.008)
     size_share: float = 0.06
     smaller: tuple[float, float, float] = (1.0, 0.15, 0.15)
@@ -95,8 +96,9 @@ class AlignmentConfig:
         than the best one's; first : weight, in nats, of the score that they reach in the first few
         steps
     most : objects whose placements are refined, the best by likenesses and first score; where none
-        of them reaches the score `enough`, so are the next `more`
-    certain : the rounds end with one that reaches this score, or where none of those left could
+        of them is `certain`, so are the next `more`
+    certain : nats that alignment, silhouette, point pairs and size may say against an object that
+        is right for all that; the rounds end with such a one, or where none of those left could
         become the most probable
     last : objects that are refined once more in the end, the best by likeness and score; the more
         points, the better shapes that are nearly alike are told apart
@@ -105,7 +107,7 @@ class AlignmentConfig:
         found has; unaligned : that of objects that were not among those; lowest : a lower score
         counts as that one
     search : how they are placed (registration/quick_alignment.py); finest : its `fine` steps in the
-        end
+        end; silhouette : how their silhouettes are held against the mask
     waves : deviations of the waves of the frame's depth (`sensor`), by which the true object may be
         off
     """
@@ -113,11 +115,10 @@ class AlignmentConfig:
     from_objects: int = 100
     tried: tuple[int, ...] = (24, 56, 80, 80)
     hasty_rounds: int = 1
-    certain: float = share(0.92)
+    certain: float = between(6.5, 0.0, 1000.0)
     margin: float = 12.0
     first: float = 30.0
     most: int = 24
-    enough: float = share(0.88)
     more: int = 40
     last: int = 14
     least_points: int = 20
@@ -145,6 +146,7 @@ class AlignmentConfig:
     finest: SearchConfig = field(
         default_factory=lambda: SearchConfig(fine=2, fine_points=800, fine_steps=8)
     )
+    silhouette: SilhouetteConfig = field(default_factory=SilhouetteConfig)
 
 
 @dataclass(frozen=True)
@@ -154,22 +156,27 @@ class FusionConfig:
     points the alignment score counts half: see brrp_cli/retrieval/score_fusion.py. `alignment` is
     of how far an object stays behind the best one, `fit` of how far that one is above or below the
     `usual` score of a right one; where depth has waves of more than `wave` metres it counts less,
-    since they lower the scores of all.
+    since they lower the scores of all. `bare` and `spilled` are nats for a placement that leaves
+    the whole mask bare, or covers as much beside it, up to the share `most_unlike`.
 
     Chosen among a few dozen on made scenes, seeds 51300, 51400, 56100 and 56200, and priors of 274
-    and 1,196 objects, for the order and the calibration of objects of more than 500 pixels; `usual`
-    and `wave` also on scenes of other sensors, those that the likelihood is fitted to.
-    docs/retrieval.md has the commands.
+    and 1,196 objects, for the order and the calibration of objects of more than 500 pixels; with
+    silhouettes, again on seeds 71100, 71200 and 71300, and the prior of 274; `usual` and `wave`
+    also on scenes of other sensors, those that the likelihood is fitted to. docs/retrieval.md has
+    the commands.
     """
 
     colour: float = 40.0
     pairs: float = 9.0
     size: float = 0.15
     alignment: float = between(40.0, 0.0, 1000.0)
-    offset: float = between(8.4, -100.0, 100.0)
+    offset: float = between(8.9, -100.0, 100.0)
     crowding: float = between(0.4, 0.0, 10.0)
-    points: float = between(150.0, 1.0, 1e6)
-    fit: float = between(40.0, 0.0, 1000.0)
+    points: float = between(200.0, 1.0, 1e6)
+    bare: float = between(16.0, 0.0, 1000.0)
+    spilled: float = between(5.0, 0.0, 1000.0)
+    most_unlike: float = between(0.4, 0.0, 1000.0)
+    fit: float = between(30.0, 0.0, 1000.0)
     usual: float = share(0.9)
     wave: float = between(0.0008, 1e-6, 1.0)
 

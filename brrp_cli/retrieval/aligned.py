@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brrp_cli.config import SearchConfig, VerificationConfig
+from brrp_cli.config.registration import SilhouetteConfig
 from brrp_cli.config.retrieval import AlignmentConfig
 from brrp_cli.frames.frame import Frame
 from brrp_cli.geometry import similarity
@@ -25,6 +26,7 @@ from brrp_cli.registration.quick_alignment import (
     finely,
     first_placements,
 )
+from brrp_cli.registration.silhouette import Silhouette, bare_and_spilled, silhouette
 from brrp_cli.registration.verification import Verifier
 
 # What is read of each object.
@@ -49,8 +51,16 @@ class Aligner:
         self._config = config
         self._held: OrderedDict[str, BareModel] = OrderedDict()
 
-    def on(self, points: NDArray[np.floating], frame: Frame, plane: Plane, wave: float) -> SeenPart:
-        """What objects are laid over: points (n, 3), metres, camera frame, in random order.
+    def on(
+        self,
+        points: NDArray[np.floating],
+        frame: Frame,
+        object_id: int,
+        plane: Plane,
+        wave: float,
+    ) -> SeenPart:
+        """What objects are laid over: points (n, 3) of an object, metres, camera frame, in random
+        order.
 
         wave : metres, by which the frame's depth errs over patches (observation/sensor_noise.py)
         """
@@ -60,7 +70,9 @@ class Aligner:
                 self._config.search.alignment_score, self._config.waves * wave
             ),
         )
-        return SeenPart(self, Verifier(points.astype(np.float64), frame, plane), search)
+        outline = silhouette(frame, object_id, self._config.silhouette)
+        verifier = Verifier(points.astype(np.float64), frame, plane)
+        return SeenPart(self, verifier, outline, search, self._config.silhouette)
 
     def models(self, names: Sequence[str]) -> list[BareModel]:
         """The models of objects of these names. Errors: PriorError."""
@@ -90,10 +102,19 @@ def tolerant(score: VerificationConfig, deviation: float) -> VerificationConfig:
 class SeenPart:
     """What is seen of one object, and how stored ones lie over it."""
 
-    def __init__(self, aligner: Aligner, verifier: Verifier, search: SearchConfig) -> None:
+    def __init__(
+        self,
+        aligner: Aligner,
+        verifier: Verifier,
+        outline: Silhouette,
+        search: SearchConfig,
+        config: SilhouetteConfig,
+    ) -> None:
         self._aligner = aligner
         self._verifier = verifier
+        self._outline = outline
         self._search = search
+        self._config = config
         self._first: dict[str, Aligned] = {}
         self._placed: dict[str, Aligned] = {}
 
@@ -116,12 +137,29 @@ class SeenPart:
         """Those (m,) of objects that `scores` was asked for, refined once more by `fine`,
         `fine_points`, `fine_distance` and `fine_steps` of `last`."""
         search = replace(last, alignment_score=self._search.alignment_score)
-        models = self._aligner.models(names)
-        return np.array(
-            [
-                finely(self._placed[name], model, self._verifier, search).score
-                for name, model in zip(names, models, strict=True)
-            ]
+        for name, model in zip(names, self._aligner.models(names), strict=True):
+            self._placed[name] = finely(self._placed[name], model, self._verifier, search)
+        return np.array([self._placed[name].score for name in names])
+
+    def silhouettes(self, names: Sequence[str]) -> NDArray[np.float64]:
+        """(2, m) of the placements of objects that `scores` was asked for: shares of the mask that
+        they leave bare, and cover beside it (registration/silhouette.py)."""
+        tolerance = self._search.alignment_score.tolerance
+        return (
+            np.array(
+                [
+                    bare_and_spilled(
+                        self._placed[name].T_cam_model[0],
+                        model,
+                        self._outline,
+                        tolerance,
+                        self._config,
+                    )
+                    for name, model in zip(names, self._aligner.models(names), strict=True)
+                ]
+            )
+            .reshape(-1, 2)
+            .T
         )
 
 

@@ -138,8 +138,8 @@ class AppearanceRetriever:
         if self.aligns:
             likely = self._believe(looks, self._made_of[1].retrieval.likeness)
             asked = [
-                (look, probabilities[look.rows], points, self._hasty)
-                for (look, points), probabilities in zip(found, likely, strict=True)
+                (object_id, look, probabilities[look.rows], points, self._hasty)
+                for object_id, (look, points), probabilities in zip(ids, found, likely, strict=True)
             ]
             looks = self._each(aligned, image, asked)
         return dict(zip(ids, looks, strict=True))

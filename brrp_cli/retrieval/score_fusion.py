@@ -4,14 +4,16 @@ For object i of the frame, stored object c and light g, with n stored objects:
 
     s_i(c, g) = offset + colour (B_i(c, g) - 1) + pairs (1 - h_i) (D_i(c) - 1) + size Z_i(c)
                 + [alignment (A_i(c) - A_i) + fit_i (A_i - usual)] m_i / (m_i + points)
+                - bare min(b_i(c), most) - spilled min(o_i(c), most)
                 - crowding ln n,    fit_i = fit min(1, wave / w)
 
 B and D are Bhattacharyya coefficients of colours and of point pairs, in [0, 1], h the hidden share
 of the silhouette, Z <= 0 what speaks against the size and A <= 1 the alignment score of c laid over
 the m points that are seen, A_i the best of them: many shapes lie well over a few points, and none
-lies well over depth with waves of deviation w. s is the log of the odds of c against "not in the
-prior" in light g. The light l of the scene is common to its objects, and that on each of them is
-near it:
+lies well over depth with waves of deviation w. b is the share of the mask that c then leaves bare,
+o what it covers beside the mask (registration/silhouette.py). s is the log of the odds of c against
+"not in the prior" in light g. The light l of the scene is common to its objects, and that on each
+of them is near it:
 
     P(l | others) ~ P(l) prod_{j != i} sum_g P(g | l) (1 + sum_c exp s_j(c, g))
     P(c | R) ~ sum_l P(l | others) sum_g P(g | l) exp s_i(c, g),    P(none | R) ~ 1
@@ -33,7 +35,8 @@ class Similarity:
     """How alike one seen object is to some stored objects.
 
     rows : (m,) which of the prior's n objects; colour : (g, m), one row for each light;
-    pairs : (m,); size : (m,), 0 or less; alignment : (m,), or 1 for all;
+    pairs : (m,); size : (m,), 0 or less; alignment : (m,), or 1 for all; bare, spilled : (m,),
+    shares of the mask that its placement leaves bare, and covers beside it, or 0 for all;
     hidden : share of the silhouette; points : observed, that objects are aligned with; wave :
     metres, by which their depth errs over patches (observation/sensor_noise.py)
     """
@@ -45,6 +48,8 @@ class Similarity:
     hidden: float
     points: int
     alignment: NDArray[np.float32] | float = 1.0
+    bare: NDArray[np.float32] | float = 0.0
+    spilled: NDArray[np.float32] | float = 0.0
     wave: float = 0.0
 
 
@@ -75,12 +80,41 @@ def believe(
     return found
 
 
+def against_silhouettes(
+    bare: NDArray[np.floating] | float, spilled: NDArray[np.floating] | float, weights: FusionConfig
+) -> NDArray[np.float64]:
+    """What the silhouettes of placements say against them, nats: see `Similarity`."""
+    most = weights.most_unlike
+    unlike = weights.bare * np.minimum(bare, most) + weights.spilled * np.minimum(spilled, most)
+    return np.asarray(unlike, dtype=np.float64)
+
+
+def looks_difference(
+    item: Similarity, weights: FusionConfig, others: FusionConfig
+) -> NDArray[np.float64]:
+    """Nats (m,) by which looks count for more with the weights `others`: point pairs, size, and
+    colours in the light in which they are most alike."""
+    return _by_looks(item, others) - _by_looks(item, weights)
+
+
+def _by_looks(item: Similarity, weights: FusionConfig) -> NDArray[np.float64]:
+    colour = weights.colour * (item.colour.max(axis=0).astype(np.float64) - 1)
+    return np.asarray(colour + by_shape(item, weights))
+
+
+def by_shape(item: Similarity, weights: FusionConfig) -> NDArray[np.float64]:
+    """What point pairs and size say for each object, nats (m,), 0 or less."""
+    pairs = weights.pairs * (1 - item.hidden) * (item.pairs.astype(np.float64) - 1)
+    return np.asarray(pairs + weights.size * item.size)
+
+
 def _log_odds(item: Similarity, count: int, weights: FusionConfig) -> NDArray[np.float64]:
-    shape = weights.pairs * (1 - item.hidden) * (item.pairs - 1) + weights.size * item.size
+    shape = by_shape(item, weights)
     sure = item.points / (item.points + weights.points)
     best = np.max(item.alignment)
     behind = weights.alignment * (item.alignment - best)
     clear = weights.wave / max(weights.wave, item.wave)
     shape = shape + sure * (behind + weights.fit * clear * (best - weights.usual))
+    shape = shape - against_silhouettes(item.bare, item.spilled, weights)
     colour = weights.colour * (item.colour.astype(np.float64) - 1)
     return np.asarray(weights.offset + colour + shape - weights.crowding * np.log(count))

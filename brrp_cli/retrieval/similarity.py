@@ -47,11 +47,12 @@ def blurred(histograms: NDArray[np.floating], share: float) -> NDArray[np.float3
 def pair_likeness(
     histogram: NDArray[np.floating] | None, stored: NDArray[np.uint8], config: SimilarityConfig
 ) -> NDArray[np.float32]:
-    """The same (m,) for the histogram over point pairs (b,) and stored views (m, v, b)."""
+    """The same (m,) for the histogram over point pairs (b,) and stored views (m, v, b); not less
+    than `least_pairs`."""
     if histogram is None:
         return np.full(len(stored), config.neutral_pairs, np.float32)
     alike = roots(stored) @ np.sqrt(histogram, dtype=np.float32)
-    return np.asarray(alike.max(axis=-1))
+    return np.asarray(np.maximum(alike.max(axis=-1), np.float32(config.least_pairs)))
 
 
 def size_penalty(

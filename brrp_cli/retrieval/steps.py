@@ -16,7 +16,8 @@ from brrp_cli.prior.store import Prior
 from brrp_cli.retrieval.aligned import Aligner
 from brrp_cli.retrieval.illuminants import lights
 from brrp_cli.retrieval.observed_appearance import see_object
-from brrp_cli.retrieval.score_fusion import Similarity
+from brrp_cli.retrieval.placed_objects import PlacedObjects
+from brrp_cli.retrieval.score_fusion import Similarity, by_shape, looks_difference
 from brrp_cli.retrieval.shortlist import Shortlist, kinds
 from brrp_cli.retrieval.similarity import lit_histograms, similarity
 
@@ -38,7 +39,7 @@ class Steps:
         self.aligns = len(prior.names) >= own.alignment.from_objects
         self._similarity = own.similarity
         if not self.aligns:
-            self._similarity = replace(own.similarity, blur=0.0, size_most=np.inf)
+            self._similarity = replace(own.similarity, blur=0.0, least_pairs=0.0, size_most=np.inf)
 
     def __reduce__(self) -> tuple[Callable[..., Steps], tuple[Prior, Config, int]]:
         return _steps, self._made_of
@@ -56,6 +57,7 @@ class Steps:
     def aligned(
         self,
         image: SeenImage,
+        object_id: int,
         look: Similarity,
         likely: NDArray[np.float64],
         points: NDArray[np.float64],
@@ -68,42 +70,48 @@ class Steps:
         if image.plane is None or len(points) < own.least_points:
             return replace(look, alignment=own.neutral)
 
-        def named(rows: NDArray[np.int64]) -> list[str]:
-            return [prior.names[row] for row in look.rows[rows]]
-
         alike = np.argsort(-likely, kind="stable")
         alike = alike[likely[alike] > likely.max() * np.exp(-own.margin)]
         ranked = [alike[kind] for kind in kinds(self._shortlist.plain[look.rows[alike]])]
         shuffled = points[np.random.default_rng(seed).permutation(len(points))]
-        seen = self._aligner.on(shuffled, image.frame, image.plane, image.wave)
-        alignment = np.full(len(look.rows), own.unaligned, np.float32)
+        seen = self._aligner.on(shuffled, image.frame, object_id, image.plane, image.wave)
+        names = [prior.names[row] for row in look.rows]
+        placed = PlacedObjects(seen, names, config.retrieval)
+        fusion = config.retrieval.fusion
         looks = np.log(np.maximum(likely, np.finfo(float).tiny))
+        shape = by_shape(look, config.retrieval.likeness)
+        counted = looks + looks_difference(look, config.retrieval.likeness, fusion)
         ends = np.cumsum(own.tried[: own.hasty_rounds] if hasty else own.tried).tolist()
         for begin, end in pairwise([0, *ends]):
             # In the prior's order, in which shards hold them.
             tried = np.sort(np.concatenate([kind[begin:end] for kind in ranked]))
-            first = seen.first_scores(named(tried))
+            first = placed.tried(tried)
             promise = looks[tried] + own.first * first
             order = tried[np.argsort(-promise, kind="stable")]
             for chosen in (order[: own.most], order[own.most : own.most + own.more]):
-                found = seen.scores(named(chosen))
-                alignment[chosen] = np.maximum(found, own.lowest)
-                if found.max(initial=0.0) >= own.enough:
+                placed.refine(chosen)
+                against = fusion.alignment * (1 - placed.agreed) - shape
+                if against.min() <= own.certain:
                     break
             left = np.concatenate([kind[end:] for kind in ranked])
             # With a score of 1, the best there is, none of those left would be the most probable.
-            worth = config.retrieval.fusion.alignment
-            if (looks + worth * alignment).max() > looks[left].max(initial=-np.inf) + worth:
+            best = (counted + fusion.alignment * placed.agreed).max()
+            if best > counted[left].max(initial=-np.inf) + fusion.alignment:
                 break
-            if alignment.max(initial=0.0) >= own.certain:
+            if against.min() <= own.certain:
                 break
-        promise = looks + own.first * alignment
-        promise[alignment <= own.lowest] = -np.inf
+        promise = looks + own.first * placed.agreed
+        promise[placed.alignment <= own.lowest] = -np.inf
         last = np.argsort(-promise, kind="stable")[: own.last]
         last = np.sort(last[np.isfinite(promise[last])])
-        found = seen.last_scores(named(last), own.finest)
-        alignment[last] = np.maximum(found, own.lowest)
-        return replace(look, alignment=alignment, wave=image.wave)
+        placed.finish(last)
+        return replace(
+            look,
+            alignment=placed.alignment,
+            bare=placed.bare,
+            spilled=placed.spilled,
+            wave=image.wave,
+        )
 
 
 @dataclass(frozen=True)
@@ -124,13 +132,14 @@ def looked(image: SeenImage, object_id: int) -> tuple[Similarity, NDArray[np.flo
 
 def aligned(
     image: SeenImage,
+    object_id: int,
     look: Similarity,
     likely: NDArray[np.float64],
     points: NDArray[np.float64],
     hasty: bool,
 ) -> Similarity:
     """See `Steps.aligned`."""
-    return image.steps.aligned(image, look, likely, points, hasty)
+    return image.steps.aligned(image, object_id, look, likely, points, hasty)
 
 
 _last: Steps | None = None

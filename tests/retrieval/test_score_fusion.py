@@ -6,7 +6,7 @@ import pytest
 from brrp_cli.config.retrieval import FusionConfig, IlluminantsConfig
 from brrp_cli.retrieval.base import unknown
 from brrp_cli.retrieval.illuminants import lights, local_lights, log_prior
-from brrp_cli.retrieval.score_fusion import Similarity, believe
+from brrp_cli.retrieval.score_fusion import Similarity, believe, looks_difference
 
 WEIGHTS = FusionConfig(
     colour=20.0, pairs=20.0, size=0.5, fit=0.0, usual=1.0, offset=8.0, crowding=1.0
@@ -92,6 +92,27 @@ def test_alignment_with_few_points_counts_less():
     found = believe([item], np.zeros(1), np.eye(1), 2, weights)[0]
     odds = np.exp([7.5, 5.0]) / 2
     np.testing.assert_allclose(found, odds / (1 + odds.sum()), rtol=1e-5)
+
+
+def test_silhouettes_speak_against_placements():
+    """Log odds 8 - 10 * 0.2 - ln 2 and 8 - 10 * 0.1 - 4 * 0.3 - ln 2; beyond 0.3 no more."""
+    weights = replace(WEIGHTS, bare=10.0, spilled=4.0, most_unlike=0.3)
+    item = replace(
+        seen([[1.0, 1.0]]),
+        bare=np.array([0.2, 0.1], np.float32),
+        spilled=np.array([0.0, 5.0], np.float32),
+    )
+    found = believe([item], np.zeros(1), np.eye(1), 2, weights)[0]
+    odds = np.exp([6.0, 5.8]) / 2
+    np.testing.assert_allclose(found, odds / (1 + odds.sum()), rtol=1e-5)
+
+
+def test_looks_count_for_more_with_other_weights():
+    item = seen([[1.0, 0.2], [0.9, 0.6]], pairs=(0.9, 0.5), size=(-1.0, -2.0), hidden=0.5)
+    others = replace(WEIGHTS, pairs=10.0, size=0.1, colour=30.0)
+    # 20 (B - 1) + 20 (1 - h) (D - 1) + 0.5 Z becomes 30 (B - 1) + 10 (1 - h) (D - 1) + 0.1 Z.
+    found = looks_difference(item, WEIGHTS, others)
+    np.testing.assert_allclose(found, [0.5 + 0.4, -4 + 2.5 + 0.8], rtol=1e-5)
 
 
 def test_objects_that_were_not_looked_at_have_no_probability():

@@ -52,6 +52,16 @@ def test_missing_poses_and_sizes_say_nothing():
     assert size_penalty(None, POSES, 0, LIKE).tolist() == [0]
 
 
+def test_point_pairs_that_are_not_alike_say_no_more_than_so_much():
+    bins = np.zeros((2, 1, PAIR_BINS), np.float32)
+    bins[0, 0, 3] = bins[1, 0, 9] = 1
+    seen = bins[0, 0]
+    stored = to_bytes(bins)
+    assert pair_likeness(seen, stored, LIKE).tolist() == pytest.approx([1, 0.8], abs=0.01)
+    small = replace(LIKE, least_pairs=0.0)
+    assert pair_likeness(seen, stored, small).tolist() == pytest.approx([1, 0], abs=0.01)
+
+
 def test_blur_shares_a_colour_with_its_neighbours_in_hue_and_chroma():
     grid = np.zeros((L_BINS, AB_BINS, AB_BINS), np.float32)
     grid[1, 3, 3], grid[2, 0, 6] = 0.6, 0.4

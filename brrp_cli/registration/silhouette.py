@@ -1,0 +1,100 @@
+"""How the silhouette of a placed model agrees with an object's mask.
+
+Where depth says nothing, as of what is dark, shiny or clear, the mask still does: a coin does not
+cover the mask of a knife, however well it lies on the points that are seen of it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brrp_cli.config.registration import SilhouetteConfig
+from brrp_cli.distance_loops import nearest_along
+from brrp_cli.frames.dilate import dilated, mask_box
+from brrp_cli.frames.frame import BACKGROUND, Frame
+from brrp_cli.registration.model import ModelGeometry
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Silhouette:
+    """Rays of pixels in and beside a mask, without those at its edge; camera frame, z = 1.
+
+    own : (n, 3) in it; beside : (m, 3) around it; depth : (m,) metres, of what stands there, inf
+    where nothing would hide the object; worth : pixels that stand for one of those beside it, as a
+    share of the mask
+    """
+
+    own: Array
+    beside: Array
+    depth: Array
+    worth: float
+
+
+def silhouette(frame: Frame, object_id: int, config: SilhouetteConfig) -> Silhouette:
+    """The silhouette of an object of the frame."""
+    mask = frame.segmap == object_id
+    tight = mask_box(mask, 0)
+    around = round(config.around * max(side.stop - side.start for side in tight))
+    box = mask_box(mask, max(around, config.least_around))
+    window = np.pad(mask[box], config.edge)
+    inside = (slice(config.edge, -config.edge),) * 2
+    beside = ~dilated(window, config.edge)[inside]
+    own = ~dilated(~window, config.edge)[inside]
+    if not own.any():
+        own = mask[box]
+    corner = box[0].start, box[1].start
+    rows, columns = _evenly(beside, config.rays_beside, corner)
+    depth = frame.depth[rows, columns].astype(np.float64)
+    hidden = np.where(frame.segmap[rows, columns] == BACKGROUND, np.inf, -np.inf)
+    return Silhouette(
+        own=_rays(frame, *_evenly(own, config.rays, corner)),
+        beside=_rays(frame, rows, columns),
+        depth=np.where(np.isfinite(depth) & (depth > 0), depth, hidden),
+        worth=float(beside.sum() / max(len(rows), 1) / max(own.sum(), 1)),
+    )
+
+
+def bare_and_spilled(
+    T_cam_model: Array,
+    model: ModelGeometry,
+    seen: Silhouette,
+    tolerance: float,
+    config: SilhouetteConfig,
+) -> tuple[float, float]:
+    """Of a placement T_cam_model (4, 4), rigid: the share of the mask that the model leaves bare,
+    and what it covers beside the mask with nothing in front, as a share of the mask.
+
+    tolerance : metres by which measured depth errs
+    """
+    T_model_cam = np.ascontiguousarray(np.linalg.inv(T_cam_model), dtype=np.float64)
+    field, unit = model.field, model.half_extent
+    grid = field.values, field.lower, field.spacing, unit, T_model_cam
+
+    # The middle of the box is the model's own, and its corners are the furthest from there.
+    reach = unit * np.sqrt(3.0)
+    off, _ = nearest_along(*grid, seen.own, reach)
+    missed = float((off > max(config.near, config.nodes * field.spacing * unit)).mean())
+    off, z = nearest_along(*grid, seen.beside, reach)
+    shown = (off < config.touched) & (seen.depth > z - tolerance)
+    return missed, float(shown.sum() * seen.worth)
+
+
+def _evenly(
+    mask: NDArray[np.bool_], count: int, corner: tuple[int, int]
+) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Rows and columns (n,) of the image of at most `count` pixels of a part (h, w) of it."""
+    rows, columns = np.nonzero(mask)
+    kept = np.linspace(0, len(rows) - 1, min(count, len(rows))).astype(np.intp)
+    return rows[kept] + corner[0], columns[kept] + corner[1]
+
+
+def _rays(frame: Frame, rows: NDArray[np.intp], columns: NDArray[np.intp]) -> Array:
+    K = frame.K
+    return np.stack(
+        [(columns - K[0, 2]) / K[0, 0], (rows - K[1, 2]) / K[1, 1], np.ones(len(rows))], axis=1
+    )

@@ -1,0 +1,53 @@
+"""What became of the stored objects that were laid over one seen object."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brrp_cli.config.retrieval import RetrievalConfig
+from brrp_cli.retrieval.aligned import SeenPart
+from brrp_cli.retrieval.score_fusion import against_silhouettes
+
+Rows = NDArray[np.int64]
+
+
+class PlacedObjects:
+    """Stored objects (m,), and how well those that were placed agree with what is seen.
+
+    alignment : (m,) scores; bare, spilled : (m,) shares of the mask (registration/silhouette.py);
+    agreed : (m,) alignment scores less what the silhouettes say against them
+    """
+
+    def __init__(self, seen: SeenPart, names: Sequence[str], config: RetrievalConfig) -> None:
+        self._seen = seen
+        self._names = names
+        self._config = config
+        self.alignment = np.full(len(names), config.alignment.unaligned, np.float32)
+        self.agreed = self.alignment.copy()
+        self.bare, self.spilled = np.zeros((2, len(names)), np.float32)
+
+    def tried(self, rows: Rows) -> NDArray[np.float64]:
+        """Scores (r,) of some of them after the first few steps. Errors: PriorError."""
+        return self._seen.first_scores(self._of(rows))
+
+    def refine(self, rows: Rows) -> None:
+        """Place some that were tried."""
+        self._judge(rows, self._seen.scores(self._of(rows)))
+
+    def finish(self, rows: Rows) -> None:
+        """Place some once more that were refined."""
+        self._judge(rows, self._seen.last_scores(self._of(rows), self._config.alignment.finest))
+
+    def _judge(self, rows: Rows, scores: NDArray[np.float64]) -> None:
+        lowest, fusion = self._config.alignment.lowest, self._config.fusion
+        bare, spilled = self._seen.silhouettes(self._of(rows))
+        against = against_silhouettes(bare, spilled, fusion) / max(fusion.alignment, 1.0)
+        self.alignment[rows] = np.maximum(scores, lowest)
+        self.agreed[rows] = np.maximum(scores - against, lowest)
+        self.bare[rows], self.spilled[rows] = bare, spilled
+
+    def _of(self, rows: Rows) -> list[str]:
+        return [self._names[row] for row in rows]
