@@ -214,9 +214,9 @@ def test_more_objects_are_tried_until_one_lies_well(prior):
 
     assert set(aligned(tried=(1,)).values()) == {1}
     # The stranger lies well on nothing, so that all are tried; the others end with their own.
-    until = aligned(tried=(1,) * 5, certain=0.85)
+    until = aligned(tried=(1,) * 5, certain=6.0)
     assert until[STRANGER] > max(until[i] for i in names) == 1
-    assert min(aligned(tried=(2,), certain=1.0).values()) > 1
+    assert min(aligned(tried=(2,), certain=0.0).values()) > 1
 
 
 def test_rounds_end_where_none_of_those_left_could_become_the_most_probable(prior):
@@ -224,7 +224,7 @@ def test_rounds_end_where_none_of_those_left_could_become_the_most_probable(prio
 
     def aligned(worth):
         aligner = retriever_of(
-            prior, True, tried=(1,) * 5, margin=100.0, unaligned=0.1, certain=1.0, worth=worth
+            prior, True, tried=(1,) * 5, margin=100.0, unaligned=0.1, certain=0.0, worth=worth
         )
         found = aligner.evidence(frame)
         return {i: int((found[i].alignment > 0.1).sum()) for i in names}
@@ -239,7 +239,7 @@ def test_rounds_end_where_none_of_those_left_could_become_the_most_probable(prio
 def test_in_haste_fewer_objects_are_tried_and_what_is_known_is_used(prior):
     frame, _ = scene()
     aligner = retriever_of(
-        prior, True, tried=(1,) * 5, margin=100.0, unaligned=0.1, certain=1.0, worth=10_000.0
+        prior, True, tried=(1,) * 5, margin=100.0, unaligned=0.1, certain=0.0, worth=10_000.0
     )
 
     def tried():
