@@ -18,12 +18,16 @@ class PlacedObjects:
     """Stored objects (m,), and how well those that were placed agree with what is seen.
 
     alignment : (m,) scores; bare, spilled : (m,) shares of the mask (registration/silhouette.py);
-    agreed : (m,) alignment scores less what the silhouettes say against them
+    agreed : (m,) alignment scores less what the silhouettes say against them; wave : metres, by
+    which depth errs over patches
     """
 
-    def __init__(self, seen: SeenPart, names: Sequence[str], config: RetrievalConfig) -> None:
+    def __init__(
+        self, seen: SeenPart, names: Sequence[str], wave: float, config: RetrievalConfig
+    ) -> None:
         self._seen = seen
         self._names = names
+        self._wave = wave
         self._config = config
         self.alignment = np.full(len(names), config.alignment.unaligned, np.float32)
         self.agreed = self.alignment.copy()
@@ -44,9 +48,9 @@ class PlacedObjects:
     def _judge(self, rows: Rows, scores: NDArray[np.float64]) -> None:
         lowest, fusion = self._config.alignment.lowest, self._config.fusion
         bare, spilled = self._seen.silhouettes(self._of(rows))
-        against = against_silhouettes(bare, spilled, fusion) / max(fusion.alignment, 1.0)
+        against = against_silhouettes(bare, spilled, self._wave, fusion)
         self.alignment[rows] = np.maximum(scores, lowest)
-        self.agreed[rows] = np.maximum(scores - against, lowest)
+        self.agreed[rows] = np.maximum(scores - against / max(fusion.alignment, 1.0), lowest)
         self.bare[rows], self.spilled[rows] = bare, spilled
 
     def _of(self, rows: Rows) -> list[str]:

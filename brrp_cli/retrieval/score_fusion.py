@@ -4,8 +4,8 @@ For object i of the frame, stored object c and light g, with n stored objects:
 
     s_i(c, g) = offset + colour (B_i(c, g) - 1) + pairs (1 - h_i) (D_i(c) - 1) + size Z_i(c)
                 + [alignment (A_i(c) - A_i) + fit_i (A_i - usual)] m_i / (m_i + points)
-                - bare min(b_i(c), most) - spilled min(o_i(c), most)
-                - crowding ln n,    fit_i = fit min(1, wave / w)
+                - bare_i min(b_i(c), most) - spilled_i min(o_i(c), most)
+                - crowding ln n,    fit_i = fit min(1, wave / w), and so bare_i, spilled_i
 
 B and D are Bhattacharyya coefficients of colours and of point pairs, in [0, 1], h the hidden share
 of the silhouette, Z <= 0 what speaks against the size and A <= 1 the alignment score of c laid over
@@ -81,12 +81,20 @@ def believe(
 
 
 def against_silhouettes(
-    bare: NDArray[np.floating] | float, spilled: NDArray[np.floating] | float, weights: FusionConfig
+    bare: NDArray[np.floating] | float,
+    spilled: NDArray[np.floating] | float,
+    wave: float,
+    weights: FusionConfig,
 ) -> NDArray[np.float64]:
     """What the silhouettes of placements say against them, nats: see `Similarity`."""
     most = weights.most_unlike
     unlike = weights.bare * np.minimum(bare, most) + weights.spilled * np.minimum(spilled, most)
-    return np.asarray(unlike, dtype=np.float64)
+    return np.asarray(_clear(wave, weights) * unlike, dtype=np.float64)
+
+
+def _clear(wave: float, weights: FusionConfig) -> float:
+    """How much counts what waves and blurred edges of depth make worse for all objects."""
+    return weights.wave / max(weights.wave, wave)
 
 
 def looks_difference(
@@ -113,8 +121,8 @@ def _log_odds(item: Similarity, count: int, weights: FusionConfig) -> NDArray[np
     sure = item.points / (item.points + weights.points)
     best = np.max(item.alignment)
     behind = weights.alignment * (item.alignment - best)
-    clear = weights.wave / max(weights.wave, item.wave)
+    clear = _clear(item.wave, weights)
     shape = shape + sure * (behind + weights.fit * clear * (best - weights.usual))
-    shape = shape - against_silhouettes(item.bare, item.spilled, weights)
+    shape = shape - against_silhouettes(item.bare, item.spilled, item.wave, weights)
     colour = weights.colour * (item.colour.astype(np.float64) - 1)
     return np.asarray(weights.offset + colour + shape - weights.crowding * np.log(count))

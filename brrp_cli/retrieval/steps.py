@@ -76,7 +76,7 @@ class Steps:
         shuffled = points[np.random.default_rng(seed).permutation(len(points))]
         seen = self._aligner.on(shuffled, image.frame, object_id, image.plane, image.wave)
         names = [prior.names[row] for row in look.rows]
-        placed = PlacedObjects(seen, names, config.retrieval)
+        placed = PlacedObjects(seen, names, image.wave, config.retrieval)
         fusion = config.retrieval.fusion
         looks = np.log(np.maximum(likely, np.finfo(float).tiny))
         shape = by_shape(look, config.retrieval.likeness)

@@ -105,6 +105,11 @@ def test_silhouettes_speak_against_placements():
     found = believe([item], np.zeros(1), np.eye(1), 2, weights)[0]
     odds = np.exp([6.0, 5.8]) / 2
     np.testing.assert_allclose(found, odds / (1 + odds.sum()), rtol=1e-5)
+    # Waves twice as high as `wave`: half of it.
+    wavy = replace(item, wave=2 * weights.wave)
+    found = believe([wavy], np.zeros(1), np.eye(1), 2, weights)[0]
+    odds = np.exp([7.0, 6.9]) / 2
+    np.testing.assert_allclose(found, odds / (1 + odds.sum()), rtol=1e-5)
 
 
 def test_looks_count_for_more_with_other_weights():
