@@ -42,7 +42,7 @@ def silhouette(frame: Frame, object_id: int, config: SilhouetteConfig) -> Silhou
     around = round(config.around * max(side.stop - side.start for side in tight))
     box = mask_box(mask, max(around, config.least_around))
     window = np.pad(mask[box], config.edge)
-    inside = (slice(config.edge, -config.edge),) * 2
+    inside = tuple(slice(config.edge, size - config.edge) for size in window.shape)
     beside = ~dilated(window, config.edge)[inside]
     own = ~dilated(~window, config.edge)[inside]
     if not own.any():
@@ -74,14 +74,13 @@ def bare_and_spilled(
     T_model_cam = np.ascontiguousarray(np.linalg.inv(T_cam_model), dtype=np.float64)
     field, unit = model.field, model.half_extent
     grid = field.values, field.lower, field.spacing, unit, T_model_cam
-
-    # The middle of the box is the model's own, and its corners are the furthest from there.
+    # The origin is the middle of the model's box, whose corners are no further from it.
     reach = unit * np.sqrt(3.0)
     off, _ = nearest_along(*grid, seen.own, reach)
-    missed = float((off > max(config.near, config.nodes * field.spacing * unit)).mean())
+    bare = float((off > max(config.near, config.nodes * field.spacing * unit)).mean())
     off, z = nearest_along(*grid, seen.beside, reach)
     shown = (off < config.touched) & (seen.depth > z - tolerance)
-    return missed, float(shown.sum() * seen.worth)
+    return bare, float(shown.sum() * seen.worth)
 
 
 def _evenly(
