@@ -58,10 +58,11 @@ class VerificationConfig:
 class SilhouetteConfig:
     """How a placed model's silhouette is held against a mask (registration/silhouette.py).
 
-    edge : pixels at the mask's edge that count for neither side; around : part of the mask's longer
-    side that is looked at beside it, and at least so many pixels; rays, rays_beside : at most
-    near : metres, or so many nodes of the model's distances, within which it covers a ray; touched
-    : metres, within which it reaches into one beside the mask
+    edge : pixels at the mask's edge that count for neither side
+    around : part of the mask's longer side that is looked at beside it; least_around : pixels, at
+        least; rays, rays_beside : in and beside the mask, at most
+    near : metres, and nodes : spacings of the model's distances, of which the larger is how near
+        to a ray it covers that; touched : metres, how near it reaches into one beside the mask
     """
 
     edge: int = 1

@@ -66,6 +66,8 @@ class SimilarityConfig:
         anything; size_share : and by that part of the stored one
     blur : share of each colour that counts to either of the neighbouring bins of a* and b*: a plain
         colour fills one bin, and the light tried may lie beside the true one
+    least_pairs : likeness of point pairs that a lower one counts as: the normals of what is flat or
+        thin are noise
     smaller : weight of being smaller than the stored object, against being larger: a footprint is
         seen from one side; size_limit : squared spreads beyond which nothing more speaks against
         it; size_most : what speaks against all three at most, since an object that leans on

@@ -70,9 +70,9 @@ class Aligner:
                 self._config.search.alignment_score, self._config.waves * wave
             ),
         )
-        outline = silhouette(frame, object_id, self._config.silhouette)
+        seen = silhouette(frame, object_id, self._config.silhouette)
         verifier = Verifier(points.astype(np.float64), frame, plane)
-        return SeenPart(self, verifier, outline, search, self._config.silhouette)
+        return SeenPart(self, verifier, seen, search, self._config.silhouette)
 
     def models(self, names: Sequence[str]) -> list[BareModel]:
         """The models of objects of these names. Errors: PriorError."""
@@ -106,13 +106,13 @@ class SeenPart:
         self,
         aligner: Aligner,
         verifier: Verifier,
-        outline: Silhouette,
+        seen: Silhouette,
         search: SearchConfig,
         config: SilhouetteConfig,
     ) -> None:
         self._aligner = aligner
         self._verifier = verifier
-        self._outline = outline
+        self._silhouette = seen
         self._search = search
         self._config = config
         self._first: dict[str, Aligned] = {}
@@ -151,7 +151,7 @@ class SeenPart:
                     bare_and_spilled(
                         self._placed[name].T_cam_model[0],
                         model,
-                        self._outline,
+                        self._silhouette,
                         tolerance,
                         self._config,
                     )

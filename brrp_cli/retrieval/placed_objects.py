@@ -49,8 +49,10 @@ class PlacedObjects:
         lowest, fusion = self._config.alignment.lowest, self._config.fusion
         bare, spilled = self._seen.silhouettes(self._of(rows))
         against = against_silhouettes(bare, spilled, self._wave, fusion)
+        # In alignment scores, as far as these count at all.
+        against = against / max(fusion.alignment, 1.0)
         self.alignment[rows] = np.maximum(scores, lowest)
-        self.agreed[rows] = np.maximum(scores - against / max(fusion.alignment, 1.0), lowest)
+        self.agreed[rows] = np.maximum(scores - against, lowest)
         self.bare[rows], self.spilled[rows] = bare, spilled
 
     def _of(self, rows: Rows) -> list[str]:
