@@ -140,38 +140,49 @@ def nearest_along(
     unit: float,
     T_model_cam: Array,
     rays: Array,
-    reach: float,
 ) -> tuple[Array, Array]:
-    """Along rays (n, 3) from the camera, z = 1: the least distance to the surface, metres, and the
-    depth where that is, (n,) each; a ray ends where it enters.
+    """Along rays (n, 3) from the camera, z = 1, as far as they are in the grid: the least distance
+    to the surface, metres, and the depth where that is, (n,) each; inf for rays that miss the grid,
+    and a ray ends where it enters the surface.
 
-    T_model_cam : (4, 4) rigid; unit : metres of one unit of the grid; reach : metres about the
-    model's middle within which rays are followed
+    T_model_cam : (4, 4) rigid; unit : metres of one unit of the grid
     """
-    least, at = np.empty(len(rays)), np.empty(len(rays))
+    least, at = np.full(len(rays), np.inf), np.full(len(rays), np.inf)
     flat = values.ravel()
-    a, b, c = T_model_cam[0, 3], T_model_cam[1, 3], T_model_cam[2, 3]
+    grid = _to_nodes(T_model_cam, lower, 1 / spacing, unit)
+    way = np.empty(3)
     for n in range(len(rays)):
-        dx, dy, dz = (
-            T_model_cam[0, 0] * rays[n, 0] + T_model_cam[0, 1] * rays[n, 1] + T_model_cam[0, 2],
-            T_model_cam[1, 0] * rays[n, 0] + T_model_cam[1, 1] * rays[n, 1] + T_model_cam[1, 2],
-            T_model_cam[2, 0] * rays[n, 0] + T_model_cam[2, 1] * rays[n, 1] + T_model_cam[2, 2],
-        )
-        square = dx * dx + dy * dy + dz * dz
-        middle, half = -(a * dx + b * dy + c * dz) / square, reach / math.sqrt(square)
-        z = max(middle - half, 0.0)
-        least[n], at[n] = np.inf, z
+        length = 0.0
+        for i in range(3):
+            way[i] = grid[i, 0] * rays[n, 0] + grid[i, 1] * rays[n, 1] + grid[i, 2] * rays[n, 2]
+            length += way[i] * way[i]
+        # Metres of the model for one of depth.
+        length = math.sqrt(length) * spacing * unit
+        z, end = _within(grid[:, 3], way, values.shape)
         for _ in range(LONGEST_WALK):
-            x, y, w = _in_nodes(
-                (a + z * dx) / unit, (b + z * dy) / unit, (c + z * dz) / unit, lower, 1 / spacing
-            )
+            if z > end:
+                break
+            x, y, w = grid[0, 3] + z * way[0], grid[1, 3] + z * way[1], grid[2, 3] + z * way[2]
             off = _distance(flat, values.shape, spacing, x, y, w) * unit
             if off < least[n]:
                 least[n], at[n] = off, z
-            z += max(off, SHORTEST_STEP) / math.sqrt(square)
-            if off <= 0 or z > middle + half:
+            if off <= 0:
                 break
+            z += max(off, SHORTEST_STEP) / length
     return least, at
+
+
+@compiled
+def _within(start: Array, way: Array, shape: tuple[int, int, int]) -> tuple[float, float]:
+    """From where to where, 0 or more, start + z * way, in nodes, is in a grid; the first is the
+    larger where it nowhere is."""
+    begin, end = 0.0, np.inf
+    for i in range(3):
+        # What runs along an axis of the grid is all in it, or nowhere.
+        slope = way[i] if abs(way[i]) > TINY else TINY
+        one, other = -start[i] / slope, (shape[i] - 1 - start[i]) / slope
+        begin, end = max(begin, min(one, other)), min(end, max(one, other))
+    return begin, end
 
 
 @compiled

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from brrp_cli.config import SearchConfig
 from brrp_cli.registration.model import ModelGeometry
 from brrp_cli.registration.sdf_refinement import refine_to_sdf
+from brrp_cli.registration.transform_loops import inverses
 from brrp_cli.registration.verification import Verifier
 
 Array = NDArray[np.float64]
@@ -76,6 +77,5 @@ def brought_nearer(
 ) -> Array:
     """Each placement (B, 4, 4) with so many observed points brought onto its surface; its size
     stays. Points further from it than `distance` metres do not pull."""
-    T_model_cam = np.asarray(np.linalg.inv(T_cam_model), dtype=np.float64)
     seen = verifier.points[:points]
-    return np.asarray(np.linalg.inv(refine_to_sdf(T_model_cam, seen, model, distance, steps)))
+    return inverses(refine_to_sdf(inverses(T_cam_model), seen, model, distance, steps))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -29,9 +31,7 @@ def resting_initial_poses(
     """
     if not model.resting:
         return np.zeros((0, 4, 4))
-    turned = np.stack(
-        [_turn(angle) for angle in np.arange(config.turns) * (2 * np.pi / config.turns)]
-    )
+    turned = _turns(config.turns)
     resting = np.stack(model.resting)
     T = (turned @ resting[:, None]).reshape(-1, 4, 4)
     surface = model.surface[: config.model_points]
@@ -93,6 +93,12 @@ def _longest(T_plane_model: Array, surface: Array) -> Array:
     return np.asarray(np.linalg.eigh(along)[1][:, :, 1])
 
 
-def _turn(angle: float) -> Array:
-    cosine, sine = np.cos(angle), np.sin(angle)
-    return similarity(rotation=np.array([[cosine, -sine, 0], [sine, cosine, 0], [0, 0, 1]]))
+@lru_cache(maxsize=4)
+def _turns(count: int) -> Array:
+    """(count, 4, 4), evenly spread about the third axis."""
+    angle = np.arange(count) * (2 * np.pi / count)
+    T = np.tile(np.eye(4), (count, 1, 1))
+    T[:, 0, 0] = T[:, 1, 1] = np.cos(angle)
+    T[:, 1, 0] = np.sin(angle)
+    T[:, 0, 1] = -T[:, 1, 0]
+    return T

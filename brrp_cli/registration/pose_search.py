@@ -27,6 +27,7 @@ from brrp_cli.registration.leaning_poses import resting_and_leaning
 from brrp_cli.registration.model import Model
 from brrp_cli.registration.scale_scan import ObservedCloud
 from brrp_cli.registration.sdf_refinement import refine_to_sdf
+from brrp_cli.registration.transform_loops import inverses
 from brrp_cli.registration.verification import Verifier
 
 Array = NDArray[np.float64]
@@ -252,13 +253,13 @@ def _of_other_sizes(
     refined with the pose. What comes out as large as the model is no other hypothesis."""
     parents = [each.T_cam_model for each in found[: config.rescaled]]
     T = np.stack([_resize(each, s, verifier) for each in parents for s in config.sizes])
-    T_model_cam = np.asarray(np.linalg.inv(T), dtype=np.float64)
+    T_model_cam = inverses(T)
     seen = verifier.points[: config.middle_points]
     for resize in (True, False):
         T_model_cam = refine_to_sdf(
             T_model_cam, seen, model, config.size_distance, config.middle_steps, resize=resize
         )
-    T = np.asarray(np.linalg.inv(T_model_cam))
+    T = inverses(T_model_cam)
     log_size = np.log(np.cbrt(np.linalg.det(T[:, :3, :3])))
     other = (np.abs(log_size) > config.least_size_change) & (np.abs(log_size) < config.most_size)
     cost = config.size_cost + config.size_spread_cost * log_size**2

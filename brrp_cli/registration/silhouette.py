@@ -74,11 +74,9 @@ def bare_and_spilled(
     T_model_cam = np.ascontiguousarray(np.linalg.inv(T_cam_model), dtype=np.float64)
     field, unit = model.field, model.half_extent
     grid = field.values, field.lower, field.spacing, unit, T_model_cam
-    # The origin is the middle of the model's box, whose corners are no further from it.
-    reach = unit * np.sqrt(3.0)
-    off, _ = nearest_along(*grid, seen.own, reach)
+    off, _ = nearest_along(*grid, seen.own)
     bare = float((off > max(config.near, config.nodes * field.spacing * unit)).mean())
-    off, z = nearest_along(*grid, seen.beside, reach)
+    off, z = nearest_along(*grid, seen.beside)
     shown = (off < config.touched) & (seen.depth > z - tolerance)
     return bare, float(shown.sum() * seen.worth)
 

@@ -28,6 +28,7 @@ from brrp_cli.registration.colour_pose import (
 )
 from brrp_cli.registration.pose_search import Hypothesis, different, without_same
 from brrp_cli.registration.sdf_refinement import refine_to_sdf
+from brrp_cli.registration.transform_loops import inverses
 from brrp_cli.registration.verification import Verifier
 from brrp_cli.seeds import child_rng
 
@@ -66,13 +67,13 @@ def turned(
     coarse = np.minimum(_distances(T, placed, points[: turn.coarse_points]), turn.far).mean(axis=1)
     T = T[best_and_different(start[:, :3, :3], -coarse, turn.count, turn.apart)]
     refined = refine_to_sdf(
-        np.asarray(np.linalg.inv(T), dtype=np.float64),
+        inverses(T),
         points[: config.fine_points],
         placed.model,
         config.fine_distance,
         config.middle_steps,
     )
-    T = np.asarray(np.linalg.inv(refined), dtype=np.float64)
+    T = inverses(refined)
     near = np.minimum(_distances(T, placed, points[: config.fine_points]), turn.far).mean(axis=1)
     near_enough = np.argsort(near, kind="stable")[: turn.judged]
     T = different(T[near_enough[near[near_enough] <= near.min() + turn.worse]], config)
@@ -167,7 +168,7 @@ def _distances(
     """(K, n) metres of points (n, 3), camera frame, from the surface under each placement; by the
     coarse field, or exact."""
     stored = placed.model.stored
-    T_model_cam = np.linalg.inv(T_cam_model)
+    T_model_cam = inverses(T_cam_model)
     moved = np.concatenate([transform_points(each, points) for each in T_model_cam])
     if exact:
         distance = stored.shape.distance(moved / stored.half_extent) * stored.half_extent

@@ -13,6 +13,7 @@ from brrp_cli.frames.frame import Frame
 from brrp_cli.observation.support_plane import Plane
 from brrp_cli.registration.model import ModelGeometry
 from brrp_cli.registration.outline import Outline, outline
+from brrp_cli.registration.transform_loops import inverses
 
 Array = NDArray[np.float64]
 
@@ -58,7 +59,7 @@ class Verifier:
             distances.lower,
             distances.spacing,
             model.half_extent,
-            np.asarray(np.linalg.inv(T), dtype=np.float64),
+            inverses(T),
             self.points[:seen_points],
             config.near,
             config.far,
