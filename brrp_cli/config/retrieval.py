@@ -117,7 +117,7 @@ class AlignmentConfig:
     from_objects: int = 100
     tried: tuple[int, ...] = (24, 56, 80, 80)
     hasty_rounds: int = 1
-    certain: float = between(6.5, 0.0, 1000.0)
+    certain: float = between(5.5, 0.0, 1000.0)
     margin: float = 12.0
     first: float = 30.0
     most: int = 24
@@ -130,12 +130,12 @@ class AlignmentConfig:
     waves: float = 2.0
     search: SearchConfig = field(
         default_factory=lambda: SearchConfig(
-            turns=16,
+            turns=12,
             box_points=200,
             model_points=100,
             seen_points=100,
             first_share=2,
-            begun=400,
+            begun=1_000,
             begun_steps=2,
             coarse=24,
             coarse_points=60,
@@ -160,8 +160,9 @@ class FusionConfig:
     of how far an object stays behind the best one, `fit` of how far that one is above or below the
     `usual` score of a right one; where depth has waves of more than `wave` metres it counts less,
     since they lower the scores of all. `bare` and `spilled` are nats for a placement that leaves
-    the whole mask bare, or covers as much beside it, up to the share `most_unlike`; they, too,
-    count less in waves, since the cameras that have them blur silhouettes.
+    the whole mask bare, or covers as much beside it, up to the shares `most_bare` and
+    `most_spilled`; they, too, count less in waves, since the cameras that have them blur
+    silhouettes.
 
     Chosen among a few dozen on made scenes, seeds 51300, 51400, 56100 and 56200, and priors of 274
     and 1,196 objects, for the order and the calibration of objects of more than 500 pixels; with
@@ -173,13 +174,14 @@ class FusionConfig:
     colour: float = 40.0
     pairs: float = 9.0
     size: float = 0.15
-    alignment: float = between(40.0, 0.0, 1000.0)
-    offset: float = between(8.9, -100.0, 100.0)
+    alignment: float = between(45.0, 0.0, 1000.0)
+    offset: float = between(9.15, -100.0, 100.0)
     crowding: float = between(0.4, 0.0, 10.0)
-    points: float = between(200.0, 1.0, 1e6)
+    points: float = between(150.0, 1.0, 1e6)
     bare: float = between(16.0, 0.0, 1000.0)
     spilled: float = between(5.0, 0.0, 1000.0)
-    most_unlike: float = between(0.4, 0.0, 1000.0)
+    most_bare: float = between(0.4, 0.0, 1000.0)
+    most_spilled: float = between(1.0, 0.0, 1000.0)
     fit: float = between(30.0, 0.0, 1000.0)
     usual: float = share(0.9)
     wave: float = between(0.0008, 1e-6, 1.0)

@@ -21,11 +21,14 @@ Array = NDArray[np.float64]
 
 def best_brought_nearer(
     T_cam_model: Array, model: ModelGeometry, verifier: Verifier, config: SearchConfig
-) -> tuple[Array, float]:
+) -> tuple[Array, Array]:
     """The `coarse` best of placements (B, 4, 4) after `begun_steps` steps with `begun_points`
-    observed points, best first, and the best score."""
+    observed points, best first, and their scores. Of more than `begun` only the best begin."""
+    T = T_cam_model
+    if len(T) > config.begun:
+        T, _ = best_of(T, model, verifier, config, config.begun, config.first_share)
     T = brought_nearer(
-        T_cam_model,
+        T,
         model,
         verifier,
         config.begun_points,
@@ -42,12 +45,12 @@ def best_of(
     config: SearchConfig,
     count: int,
     share: int = 1,
-) -> tuple[Array, float]:
+) -> tuple[Array, Array]:
     """The `count` best placements by a coarse alignment score, with one of `share` of its points,
-    best first, and the best score."""
+    best first, and their scores."""
     score = coarse_score(T_cam_model, model, verifier, config, share)
     order = np.argsort(-score, kind="stable")[:count]
-    return np.asarray(T_cam_model[order]), float(score[order[0]])
+    return np.asarray(T_cam_model[order]), np.asarray(score[order])
 
 
 def coarse_score(

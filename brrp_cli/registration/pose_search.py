@@ -67,9 +67,8 @@ def search(
     best : alignment score that another model has reached
     """
     T = _initial_poses(model, observed, verifier, features, config, seed)
-    T, _ = best_of(T, model, verifier, config, config.begun, config.first_share)
-    T, reached = best_brought_nearer(T, model, verifier, config)
-    if reached < config.unpromising:
+    T, scores = best_brought_nearer(T, model, verifier, config)
+    if scores[0] < config.unpromising:
         return _judged(T[:1], model, verifier, config)
     T = brought_nearer(
         T, model, verifier, config.coarse_points, config.coarse_distance, config.coarse_steps
@@ -79,8 +78,8 @@ def search(
         (config.middle, config.middle_points, config.coarse_distance, config.middle_steps),
         (config.fine, config.fine_points, config.fine_distance, config.fine_steps),
     ):
-        T, reached = best_of(T, model, verifier, config, count)
-        if reached < least:
+        T, scores = best_of(T, model, verifier, config, count)
+        if scores[0] < least:
             return _judged(T[:1], model, verifier, config)
         T = brought_nearer(different(T, config), model, verifier, points, distance, steps)
     found = _judged(T, model, verifier, config)

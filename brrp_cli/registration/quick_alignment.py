@@ -24,11 +24,25 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Aligned:
-    """T_cam_model (B, 4, 4), placements of a model, best first, and the score of the best, 1 at
+    """T_cam_model (B, 4, 4), placements of a model, best first, and their scores (B,), 1 at
     best."""
 
     T_cam_model: Array
-    score: float
+    scores: Array
+
+    @property
+    def score(self) -> float:
+        """That of the best placement."""
+        return float(self.scores[0])
+
+    def first(self, count: int) -> Aligned:
+        """So many of them."""
+        return Aligned(self.T_cam_model[:count], self.scores[:count])
+
+    def ordered(self, values: Array) -> Aligned:
+        """The first (n,) placements, those with the largest values (n,) first."""
+        order = np.argsort(-values, kind="stable")
+        return Aligned(np.asarray(self.T_cam_model[order]), self.scores[order])
 
 
 def aligned(
@@ -69,8 +83,7 @@ def finely(
     score = verifier.score(
         T, model, config.alignment_score, model_points=points, seen_points=points
     )
-    order = np.argsort(-score, kind="stable")
-    return Aligned(np.asarray(T[order]), float(score[order[0]]))
+    return Aligned(T, score).ordered(score)
 
 
 def first_placements(model: ModelGeometry, verifier: Verifier, config: SearchConfig) -> Aligned:
@@ -81,7 +94,6 @@ def first_placements(model: ModelGeometry, verifier: Verifier, config: SearchCon
     that it can reach, and nine in ten come there in these few steps.
     """
     T = resting_and_leaning(model, verifier.outline(config), config)
-    T, _ = best_of(T, model, verifier, config, config.begun, config.first_share)
     return Aligned(*best_brought_nearer(T, model, verifier, config))
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import OrderedDict
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -39,6 +39,8 @@ PARTS = (
     f"{DISTANCES}/spacing",
     f"{DISTANCES}/values",
 )
+Shares = NDArray[np.floating]
+Against = Callable[[Shares, Shares], Shares]
 # Models that are held in memory, 0.2 MB each.
 HELD = 1024
 
@@ -133,34 +135,46 @@ class SeenPart:
         self._placed.update(zip(names, placed, strict=True))
         return np.array([each.score for each in placed])
 
-    def last_scores(self, names: Sequence[str], last: SearchConfig) -> NDArray[np.float64]:
+    def last_scores(
+        self, names: Sequence[str], last: SearchConfig, against: Against
+    ) -> NDArray[np.float64]:
         """Those (m,) of objects that `scores` was asked for, refined once more by `fine`,
-        `fine_points`, `fine_distance` and `fine_steps` of `last`."""
+        `fine_points`, `fine_distance` and `fine_steps` of `last`.
+
+        against : what silhouettes say against placements, in alignment scores, from shares (b,)
+        that are bare and spilled. Of the placements of an object those with the best scores less
+        that are refined, and the best of them is taken.
+        """
         search = replace(last, alignment_score=self._search.alignment_score)
         for name, model in zip(names, self._aligner.models(names), strict=True):
-            self._placed[name] = finely(self._placed[name], model, self._verifier, search)
+            placed = self._placed[name].first(self._search.fine)
+            placed = finely(self._agreeing(placed, model, against), model, self._verifier, search)
+            self._placed[name] = self._agreeing(placed, model, against)
         return np.array([self._placed[name].score for name in names])
 
     def silhouettes(self, names: Sequence[str]) -> NDArray[np.float64]:
         """(2, m) of the placements of objects that `scores` was asked for: shares of the mask that
         they leave bare, and cover beside it (registration/silhouette.py)."""
+        models = self._aligner.models(names)
+        found = [
+            self._shares(self._placed[name].first(1), model)
+            for name, model in zip(names, models, strict=True)
+        ]
+        return np.concatenate([np.zeros((2, 0)), *found], axis=1)
+
+    def _agreeing(self, placed: Aligned, model: BareModel, against: Against) -> Aligned:
+        """The placements whose scores and silhouettes are best first."""
+        return placed.ordered(placed.scores - against(*self._shares(placed, model)))
+
+    def _shares(self, placed: Aligned, model: BareModel) -> NDArray[np.float64]:
+        """Bare and spilled (2, b) of each placement."""
         tolerance = self._search.alignment_score.tolerance
-        return (
-            np.array(
-                [
-                    bare_and_spilled(
-                        self._placed[name].T_cam_model[0],
-                        model,
-                        self._silhouette,
-                        tolerance,
-                        self._config,
-                    )
-                    for name, model in zip(names, self._aligner.models(names), strict=True)
-                ]
-            )
-            .reshape(-1, 2)
-            .T
-        )
+        return np.array(
+            [
+                bare_and_spilled(T, model, self._silhouette, tolerance, self._config)
+                for T in placed.T_cam_model
+            ]
+        ).T
 
 
 def bare_model(arrays: dict[str, NDArray[Any]], points: int) -> BareModel:

@@ -43,17 +43,23 @@ class PlacedObjects:
 
     def finish(self, rows: Rows) -> None:
         """Place some once more that were refined."""
-        self._judge(rows, self._seen.last_scores(self._of(rows), self._config.alignment.finest))
+        finest = self._config.alignment.finest
+        self._judge(rows, self._seen.last_scores(self._of(rows), finest, self._against))
 
     def _judge(self, rows: Rows, scores: NDArray[np.float64]) -> None:
-        lowest, fusion = self._config.alignment.lowest, self._config.fusion
+        lowest = self._config.alignment.lowest
         bare, spilled = self._seen.silhouettes(self._of(rows))
-        against = against_silhouettes(bare, spilled, self._wave, fusion)
-        # In alignment scores, as far as these count at all.
-        against = against / max(fusion.alignment, 1.0)
         self.alignment[rows] = np.maximum(scores, lowest)
-        self.agreed[rows] = np.maximum(scores - against, lowest)
+        self.agreed[rows] = np.maximum(scores - self._against(bare, spilled), lowest)
         self.bare[rows], self.spilled[rows] = bare, spilled
+
+    def _against(
+        self, bare: NDArray[np.floating], spilled: NDArray[np.floating]
+    ) -> NDArray[np.float64]:
+        """What silhouettes say against placements, in alignment scores, as far as these count."""
+        fusion = self._config.fusion
+        against = against_silhouettes(bare, spilled, self._wave, fusion)
+        return np.asarray(against / max(fusion.alignment, 1.0))
 
     def _of(self, rows: Rows) -> list[str]:
         return [self._names[row] for row in rows]

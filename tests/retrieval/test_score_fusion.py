@@ -96,7 +96,7 @@ def test_alignment_with_few_points_counts_less():
 
 def test_silhouettes_speak_against_placements():
     """Log odds 8 - 10 * 0.2 - ln 2 and 8 - 10 * 0.1 - 4 * 0.3 - ln 2; beyond 0.3 no more."""
-    weights = replace(WEIGHTS, bare=10.0, spilled=4.0, most_unlike=0.3)
+    weights = replace(WEIGHTS, bare=10.0, spilled=4.0, most_bare=0.3, most_spilled=0.3)
     item = replace(
         seen([[1.0, 1.0]]),
         bare=np.array([0.2, 0.1], np.float32),
