@@ -11,6 +11,7 @@ from brrp_cli.config.retrieval import AlignmentConfig
 from brrp_cli.geometry import similarity, transform_points
 from brrp_cli.registration.model import search_model
 from brrp_cli.registration.quick_alignment import (
+    Aligned,
     aligned,
     finely,
     first_placements,
@@ -65,3 +66,12 @@ def test_an_object_that_leans_or_lies_on_others_is_aligned_too(models):
         where = T_CAM_WORLD @ T_world_mesh
         score = scores(models, verifier_of(box(), where))
         assert score[0] > 0.85 and score[1] < score[0] - 0.2
+
+
+def test_placements_keep_their_scores_when_something_else_orders_them():
+    T = np.arange(4 * 16, dtype=np.float64).reshape(4, 4, 4)
+    placed = Aligned(T, np.array([0.9, 0.8, 0.7, 0.6]))
+    ordered = placed.first(3).ordered(placed.scores[:3] - np.array([0.3, 0.0, 0.0]))
+    np.testing.assert_array_equal(ordered.scores, [0.8, 0.7, 0.9])
+    np.testing.assert_array_equal(ordered.T_cam_model, T[[1, 2, 0]])
+    assert ordered.score == 0.8
