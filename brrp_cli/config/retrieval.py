@@ -166,9 +166,9 @@ class FusionConfig:
 
     Chosen among a few dozen on made scenes, seeds 51300, 51400, 56100 and 56200, and priors of 274
     and 1,196 objects, for the order and the calibration of objects of more than 500 pixels; with
-    silhouettes, again on seeds 71100, 71200 and 71300, and the prior of 274; `usual` and `wave`
-    also on scenes of other sensors, those that the likelihood is fitted to. docs/retrieval.md has
-    the commands.
+    silhouettes, again on seeds 71100 to 71300, 81100 and 81200; `usual` and `wave` also on
+    scenes of other sensors, those that the likelihood is fitted to. docs/retrieval.md has the
+    commands.
     """
 
     colour: float = 40.0

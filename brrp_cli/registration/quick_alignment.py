@@ -87,7 +87,7 @@ def finely(
 
 
 def first_placements(model: ModelGeometry, verifier: Verifier, config: SearchConfig) -> Aligned:
-    """The `begun` best of all ways to lay a model over what is seen, brought nearer: resting,
+    """The `coarse` best of all ways to lay a model over what is seen, brought nearer: resting,
     raised, leaning.
 
     Where they begin tells little. Of 299 true objects one in three begins within 0.1 of the score

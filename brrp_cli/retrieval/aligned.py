@@ -39,6 +39,8 @@ PARTS = (
     f"{DISTANCES}/spacing",
     f"{DISTANCES}/values",
 )
+# What speaks against placements (b,), from the shares of the mask that they leave bare, and cover
+# beside it.
 Shares = NDArray[np.floating]
 Against = Callable[[Shares, Shares], Shares]
 # Models that are held in memory, 0.2 MB each.
@@ -141,9 +143,8 @@ class SeenPart:
         """Those (m,) of objects that `scores` was asked for, refined once more by `fine`,
         `fine_points`, `fine_distance` and `fine_steps` of `last`.
 
-        against : what silhouettes say against placements, in alignment scores, from shares (b,)
-        that are bare and spilled. Of the placements of an object those with the best scores less
-        that are refined, and the best of them is taken.
+        against : what silhouettes say against placements, in alignment scores. Those placements of
+        an object are refined, and the one of them is kept, whose score less that is best.
         """
         search = replace(last, alignment_score=self._search.alignment_score)
         for name, model in zip(names, self._aligner.models(names), strict=True):
