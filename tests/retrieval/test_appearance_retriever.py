@@ -14,7 +14,7 @@ from brrp_cli.prior.parameters import BuildParameters
 from brrp_cli.prior.store import open_prior
 from brrp_cli.registration.model import search_model
 from brrp_cli.retrieval import steps
-from brrp_cli.retrieval.aligned import PARTS, bare_model
+from brrp_cli.retrieval.aligned import PARTS, Aligner, bare_model
 from brrp_cli.retrieval.appearance import AppearanceRetriever
 from brrp_cli.retrieval.base import hasty, helped, one_image, sendable, unknown
 
@@ -203,6 +203,26 @@ def test_the_true_object_alone_fills_its_mask_and_no_more(prior, aligner):
         placed = (look.alignment > 0.3) & (np.arange(len(look.rows)) != own)
         others += (look.bare + look.spilled)[placed].tolist()
     assert len(others) > 0 and np.median(others) > 0.1
+
+
+def test_silhouettes_choose_among_the_placements_of_an_object(prior):
+    """Where they speak for a placement, where against it, and where they are not asked."""
+    config = preset("default")
+    own = config.retrieval.alignment
+    frame, names = scene()
+    plane = scene_plane(frame, config.observation, 0)
+
+    def off(object_id, worth):
+        """What the placements that are kept leave bare and cover beside the mask, in all."""
+        points = np.random.default_rng(0).permutation(frame.object_points(object_id))
+        seen = Aligner(prior, own).on(points, frame, object_id, plane, 0.0)
+        seen.first_scores(prior.names)
+        seen.scores(prior.names)
+        seen.last_scores(prior.names, own.finest, lambda bare, spilled: worth * (bare + spilled))
+        return seen.silhouettes(prior.names).sum()
+
+    against, unasked, wished = (sum(off(i, worth) for i in names) for worth in (100.0, 0.0, -100.0))
+    assert against < unasked < wished
 
 
 def test_more_objects_are_tried_until_one_lies_well(prior):
