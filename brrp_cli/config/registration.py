@@ -55,6 +55,24 @@ class VerificationConfig:
 
 
 @dataclass(frozen=True)
+class MaskPosesConfig:
+    """How a model is placed by a mask alone (registration/mask_poses.py).
+
+    turns : about the plane's normal, of each resting pose; halved : times that the steps between
+        them are halved about the best; kept : how many of the best
+    directions : of the image, in which outlines are compared; points : of the model's surface;
+        steps : towards the mask
+    """
+
+    turns: int = 24
+    halved: int = 2
+    kept: int = 8
+    directions: int = 16
+    points: int = 100
+    steps: int = 4
+
+
+@dataclass(frozen=True)
 class SilhouetteConfig:
     """How a placed model's silhouette is held against a mask (registration/silhouette.py).
 
@@ -211,7 +229,7 @@ class SearchConfig:
     beaten: float = 0.3
     settled: float = 0.9
     distinct: float = 0.0015
-    kept: int = 6
+    kept: int = 8
     explained: float = 0.85
     unlikely: float = share(0.05)
     alignment_score: VerificationConfig = field(default_factory=VerificationConfig)

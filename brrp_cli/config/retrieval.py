@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from brrp_cli.config.ranges import between, share
-from brrp_cli.config.registration import SearchConfig, SilhouetteConfig
+from brrp_cli.config.registration import MaskPosesConfig, SearchConfig, SilhouetteConfig
 
 
 @dataclass(frozen=True)
@@ -60,8 +60,9 @@ class IlluminantsConfig:
 class SimilarityConfig:
     """How alike a seen object is to stored ones.
 
-    neutral_colour, neutral_pairs : likeness where it cannot be judged, as with a mesh without
-        colours: about what an object that is rightly found has
+    neutral_colour, neutral_pairs : likeness where it cannot be judged, as in a frame without
+        colours: about what an object that is rightly found has; plain_colour : that of a mesh
+        without colours, less, since any colour might have been seen of it
     size_spread : height and both sides of the footprint differ by so much without meaning
         anything; size_share : and by that part of the stored one
     blur : share of each colour that counts to either of the neighbouring bins of a* and b*: a plain
@@ -72,10 +73,12 @@ class SimilarityConfig:
         seen from one side; size_limit : squared spreads beyond which nothing more speaks against
         it; size_most : what speaks against all three at most, since an object that leans on
         others, or lies on them, stands in no resting pose on the plane
-    `blur`, `least_pairs` and `size_most` are those of priors whose objects are aligned too
+    `plain_colour`, `blur`, `least_pairs` and `size_most` are those of priors whose objects are
+    aligned too
     """
 
     neutral_colour: float = share(0.93)
+    plain_colour: float = share(0.91)
     neutral_pairs: float = share(0.97)
     blur: float = share(0.2)
     least_pairs: float = share(0.8)
@@ -92,32 +95,36 @@ class AlignmentConfig:
 
     from_objects : size of the prior from which on they are. Fewer objects are told apart without
         it, `likeness` in place of `fusion`, and real depth lowers the scores of the right one too
-    tried : objects that are laid over what is seen in one round after another, the most probable by
-        their likenesses first, so many of those with colours and of those without; hasty_rounds :
-        of these, of a mask that is only tried; margin : nats by which their likeness may be less
-        than the best one's; first : weight, in nats, of the score that they reach in the first few
-        steps
+    tried : objects that are laid over what is seen in a first round, so many of those with colours
+        and of those without, the most probable by their likenesses; margin : nats by which their
+        likeness may be less than the best one's; glanced : objects of each kind in each of the
+        rounds after it, the most probable after a glance at all; first : weight, in nats, of the
+        score that they reach at a glance, or in the first few steps
     most : objects whose placements are refined, the best by likenesses and first score; where none
         of them is `certain`, so are the next `more`
     certain : nats that alignment, silhouette, point pairs and size may say against an object that
-        is right for all that; the rounds end with such a one, or where none of those left could
-        become the most probable
+        is right for all that, and distinct : its share among those that were tried, at least; the
+        rounds end with such a one, or where none of those left could become the most probable
     last : objects that are refined once more in the end, the best by likeness and score; the more
         points, the better shapes that are nearly alike are told apart
     least_points : of the object that have to be seen
     neutral : alignment score where nothing can be aligned: about what an object that is rightly
         found has; unaligned : that of objects that were not among those; lowest : a lower score
         counts as that one
-    search : how they are placed (registration/quick_alignment.py); finest : its `fine` steps in the
-        end; silhouette : how their silhouettes are held against the mask
+    search : how they are placed (registration/quick_alignment.py); glance_turns, glance_steps : its
+        `turns` and `begun_steps` at a glance (registration/glance.py); finest : its `fine` steps in
+        the end; silhouette : how their silhouettes are held against the mask
+    blind : share of a mask's pixels that have depth, below which the mask tells too where objects
+        may lie, as `by_mask` says (registration/mask_poses.py)
     waves : deviations of the waves of the frame's depth (`sensor`), by which the true object may be
         off
     """
 
     from_objects: int = 100
-    tried: tuple[int, ...] = (24, 56, 80, 80)
-    hasty_rounds: int = 1
+    tried: int = 24
+    glanced: tuple[int, ...] = (60, 60)
     certain: float = between(5.5, 0.0, 1000.0)
+    distinct: float = share(0.5)
     margin: float = 12.0
     first: float = 30.0
     most: int = 24
@@ -146,10 +153,14 @@ class AlignmentConfig:
             fine_steps=6,
         )
     )
+    glance_turns: int = 16
+    glance_steps: int = 3
     finest: SearchConfig = field(
         default_factory=lambda: SearchConfig(fine=2, fine_points=800, fine_steps=8)
     )
     silhouette: SilhouetteConfig = field(default_factory=SilhouetteConfig)
+    blind: float = share(0.6)
+    by_mask: MaskPosesConfig = field(default_factory=MaskPosesConfig)
 
 
 @dataclass(frozen=True)
@@ -160,9 +171,8 @@ class FusionConfig:
     of how far an object stays behind the best one, `fit` of how far that one is above or below the
     `usual` score of a right one; where depth has waves of more than `wave` metres it counts less,
     since they lower the scores of all. `bare` and `spilled` are nats for a placement that leaves
-    the whole mask bare, or covers as much beside it, up to the shares `most_bare` and
-    `most_spilled`; they, too, count less in waves, since the cameras that have them blur
-    silhouettes.
+    the whole mask bare, up to the share `most_bare`, or covers e - 1 times as much beside it;
+    they, too, count less in waves, since the cameras that have them blur silhouettes.
 
     Chosen among a few dozen on made scenes, seeds 51300, 51400, 56100 and 56200, and priors of 274
     and 1,196 objects, for the order and the calibration of objects of more than 500 pixels; with
@@ -181,7 +191,6 @@ class FusionConfig:
     bare: float = between(16.0, 0.0, 1000.0)
     spilled: float = between(5.0, 0.0, 1000.0)
     most_bare: float = between(0.4, 0.0, 1000.0)
-    most_spilled: float = between(1.0, 0.0, 1000.0)
     fit: float = between(30.0, 0.0, 1000.0)
     usual: float = share(0.9)
     wave: float = between(0.0008, 1e-6, 1.0)
@@ -196,7 +205,7 @@ class ShortlistConfig:
     light_step : of every so many-th light
     """
 
-    closely: int = 256
+    closely: int = 1_024
     roughly: int = 2_000
     light_step: int = 8
 

@@ -7,8 +7,9 @@ which tells models apart long before that.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -50,19 +51,25 @@ def aligned(
     placements: Sequence[Aligned],
     verifier: Verifier,
     config: SearchConfig,
+    ordered: Callable[[Aligned, Any], Aligned] | None = None,
 ) -> list[Aligned]:
     """How well each model can be placed, from its first placements.
 
     All are refined coarsely; those that stay `beaten` behind the best of them are not refined
     further. Scores are compared with `seen_points` observed points, at last with `fine_points`.
+
+    ordered : puts placements of a model in another order than that of their scores
     """
+    order = ordered or (lambda placed, model: placed)
     found = [
-        _coarse(model, first, verifier, config)
+        order(_coarse(model, first, verifier, config), model)
         for model, first in zip(models, placements, strict=True)
     ]
     best = max((each.score for each in found), default=-np.inf)
     return [
-        finely(each, model, verifier, config) if each.score >= best - config.beaten else each
+        order(finely(each, model, verifier, config), model)
+        if each.score >= best - config.beaten
+        else each
         for each, model in zip(found, models, strict=True)
     ]
 

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from collections import OrderedDict
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from brrp_cli.config import SearchConfig, VerificationConfig
-from brrp_cli.config.registration import SilhouetteConfig
 from brrp_cli.config.retrieval import AlignmentConfig
 from brrp_cli.frames.frame import Frame
 from brrp_cli.geometry import similarity
@@ -19,6 +18,9 @@ from brrp_cli.observation.support_plane import Plane
 from brrp_cli.prior.distance_field import DistanceField
 from brrp_cli.prior.shard import DISTANCES
 from brrp_cli.prior.store import Prior
+from brrp_cli.registration.begin import coarse_score
+from brrp_cli.registration.glance import coarser, glance
+from brrp_cli.registration.mask_poses import MaskOutline, mask_outline, poses_from_mask
 from brrp_cli.registration.model import BareModel
 from brrp_cli.registration.quick_alignment import (
     Aligned,
@@ -43,8 +45,8 @@ PARTS = (
 # beside it.
 Shares = NDArray[np.floating]
 Against = Callable[[Shares, Shares], Shares]
-# Models that are held in memory, 0.2 MB each.
-HELD = 1024
+# Models that are held in memory, 0.2 MB each; and coarser ones, 0.03 MB each.
+HELD, HELD_COARSELY = 1024, 4096
 
 
 class Aligner:
@@ -54,6 +56,7 @@ class Aligner:
         self._prior = prior
         self._config = config
         self._held: OrderedDict[str, BareModel] = OrderedDict()
+        self._coarse: OrderedDict[str, BareModel] = OrderedDict()
 
     def on(
         self,
@@ -62,11 +65,13 @@ class Aligner:
         object_id: int,
         plane: Plane,
         wave: float,
+        against: Against,
     ) -> SeenPart:
         """What objects are laid over: points (n, 3) of an object, metres, camera frame, in random
         order.
 
         wave : metres, by which the frame's depth errs over patches (observation/sensor_noise.py)
+        against : what silhouettes say against placements, in alignment scores
         """
         search = replace(
             self._config.search,
@@ -74,20 +79,40 @@ class Aligner:
                 self._config.search.alignment_score, self._config.waves * wave
             ),
         )
-        seen = silhouette(frame, object_id, self._config.silhouette)
         verifier = Verifier(points.astype(np.float64), frame, plane)
-        return SeenPart(self, verifier, seen, search, self._config.silhouette)
+        own = self._config
+        blind = len(points) < own.blind * (frame.segmap == object_id).sum()
+        mask = Mask(
+            silhouette(frame, object_id, own.silhouette),
+            mask_outline(frame, object_id, plane, own.by_mask),
+            blind,
+        )
+        return SeenPart(self, verifier, mask, search, own, against)
 
     def models(self, names: Sequence[str]) -> list[BareModel]:
         """The models of objects of these names. Errors: PriorError."""
-        new = [name for name in names if name not in self._held]
+        return self._kept(names, self._held, HELD, lambda model: model)
+
+    def coarse_models(self, names: Sequence[str]) -> list[BareModel]:
+        """The same, as `glance` needs them. Errors: PriorError."""
+        points = self._config.search.model_points
+        return self._kept(names, self._coarse, HELD_COARSELY, lambda each: coarser(each, points))
+
+    def _kept(
+        self,
+        names: Sequence[str],
+        held: OrderedDict[str, BareModel],
+        most: int,
+        made: Callable[[BareModel], BareModel],
+    ) -> list[BareModel]:
+        new = [name for name in names if name not in held]
         for name, arrays in self._prior.parts(new, PARTS):
-            self._held[name] = bare_model(arrays, self._config.search.fine_points)
+            held[name] = made(bare_model(arrays, self._config.search.fine_points))
         for name in names:
-            self._held.move_to_end(name)
-        models = [self._held[name] for name in names]
-        while len(self._held) > HELD:
-            self._held.popitem(last=False)
+            held.move_to_end(name)
+        models = [held[name] for name in names]
+        while len(held) > most:
+            held.popitem(last=False)
         return models
 
 
@@ -103,6 +128,15 @@ def tolerant(score: VerificationConfig, deviation: float) -> VerificationConfig:
     )
 
 
+@dataclass(frozen=True)
+class Mask:
+    """What a mask says of where objects lie. blind : depth shows too little of it to tell alone"""
+
+    silhouette: Silhouette
+    outline: MaskOutline
+    blind: bool
+
+
 class SeenPart:
     """What is seen of one object, and how stored ones lie over it."""
 
@@ -110,47 +144,55 @@ class SeenPart:
         self,
         aligner: Aligner,
         verifier: Verifier,
-        seen: Silhouette,
+        mask: Mask,
         search: SearchConfig,
-        config: SilhouetteConfig,
+        config: AlignmentConfig,
+        against: Against,
     ) -> None:
         self._aligner = aligner
+        self._against = against
         self._verifier = verifier
-        self._silhouette = seen
+        self._mask = mask
         self._search = search
         self._config = config
         self._first: dict[str, Aligned] = {}
         self._placed: dict[str, Aligned] = {}
 
+    def glances(self, names: Sequence[str]) -> NDArray[np.float64]:
+        """Scores (m,) of the objects of these names at a glance. Errors: PriorError."""
+        models = self._aligner.coarse_models(names)
+        own = self._config
+        search = replace(self._search, turns=own.glance_turns, begun_steps=own.glance_steps)
+        return np.array([glance(model, self._verifier, search) for model in models])
+
     def first_scores(self, names: Sequence[str]) -> NDArray[np.float64]:
-        """Alignment scores (m,) of the objects of these names after the first few steps. Errors:
-        PriorError."""
+        """Alignment scores (m,) of the objects of these names after the first few steps; of what
+        depth shows a part of, less what their silhouettes say against them. Errors: PriorError."""
+        found = []
         for name, model in zip(names, self._aligner.models(names), strict=True):
-            self._first[name] = first_placements(model, self._verifier, self._search)
-        return np.array([self._first[name].score for name in names])
+            first, against = self._begun(model)
+            self._first[name] = first
+            found.append(first.score - against)
+        return np.array(found)
 
     def scores(self, names: Sequence[str]) -> NDArray[np.float64]:
         """Alignment scores (m,) of objects that `first_scores` was asked for."""
         models = self._aligner.models(names)
         first = [self._first[name] for name in names]
-        placed = aligned(models, first, self._verifier, self._search)
+        ordered = self._agreeing if self._mask.blind else None
+        placed = aligned(models, first, self._verifier, self._search, ordered)
         self._placed.update(zip(names, placed, strict=True))
         return np.array([each.score for each in placed])
 
-    def last_scores(
-        self, names: Sequence[str], last: SearchConfig, against: Against
-    ) -> NDArray[np.float64]:
-        """Those (m,) of objects that `scores` was asked for, refined once more by `fine`,
-        `fine_points`, `fine_distance` and `fine_steps` of `last`.
-
-        against : what silhouettes say against placements, in alignment scores. Those placements of
-        an object are refined, and the one of them is kept, whose score less that is best.
-        """
-        search = replace(last, alignment_score=self._search.alignment_score)
+    def last_scores(self, names: Sequence[str]) -> NDArray[np.float64]:
+        """Those (m,) of objects that `scores` was asked for, refined once more by `finest`. Of the
+        placements of an object those are refined, and the one of them is kept, whose score less
+        what silhouettes say against it is best."""
+        search = replace(self._config.finest, alignment_score=self._search.alignment_score)
         for name, model in zip(names, self._aligner.models(names), strict=True):
             placed = self._placed[name].first(self._search.fine)
-            placed = finely(self._agreeing(placed, model, against), model, self._verifier, search)
-            self._placed[name] = self._agreeing(placed, model, against)
+            placed = finely(self._agreeing(placed, model), model, self._verifier, search)
+            self._placed[name] = self._agreeing(placed, model)
         return np.array([self._placed[name].score for name in names])
 
     def silhouettes(self, names: Sequence[str]) -> NDArray[np.float64]:
@@ -158,24 +200,52 @@ class SeenPart:
         they leave bare, and cover beside it (registration/silhouette.py)."""
         models = self._aligner.models(names)
         found = [
-            self._shares(self._placed[name].first(1), model)
+            self._shares(self._placed[name].T_cam_model[:1], model)
             for name, model in zip(names, models, strict=True)
         ]
         return np.concatenate([np.zeros((2, 0)), *found], axis=1)
 
-    def _agreeing(self, placed: Aligned, model: BareModel, against: Against) -> Aligned:
-        """The placements whose scores and silhouettes are best first."""
-        return placed.ordered(placed.scores - against(*self._shares(placed, model)))
+    def silhouettes_by_mask(self, names: Sequence[str]) -> NDArray[np.float64]:
+        """The same (2, m) of the placements that the mask alone suggests; all of it, of an object
+        that rests in no pose. Errors: PriorError."""
+        found = np.ones((2, len(names)))
+        for row, model in enumerate(self._aligner.models(names)):
+            shares = self._shares(self._by_mask(model), model)
+            if shares.shape[1]:
+                found[:, row] = shares[:, self._against(*shares).argmin()]
+        return found
 
-    def _shares(self, placed: Aligned, model: BareModel) -> NDArray[np.float64]:
-        """Bare and spilled (2, b) of each placement."""
+    def _begun(self, model: BareModel) -> tuple[Aligned, float]:
+        """The first placements of a model; where depth shows too little, those by the mask among
+        them, and what the silhouette says against the best."""
+        first = first_placements(model, self._verifier, self._search)
+        if not self._mask.blind:
+            return first, 0.0
+        first = first.first(self._search.fine)
+        T = self._by_mask(model)
+        scores = coarse_score(T, model, self._verifier, self._search)
+        both = Aligned(
+            np.concatenate([first.T_cam_model, T]), np.concatenate([first.scores, scores])
+        )
+        both = self._agreeing(both, model)
+        return both, float(self._against(*self._shares(both.T_cam_model[:1], model))[0])
+
+    def _by_mask(self, model: BareModel) -> NDArray[np.float64]:
+        return poses_from_mask(model, self._mask.outline, self._config.by_mask)
+
+    def _agreeing(self, placed: Aligned, model: BareModel) -> Aligned:
+        """The placements whose scores and silhouettes are best first."""
+        against = self._against(*self._shares(placed.T_cam_model, model))
+        return placed.ordered(placed.scores - against)
+
+    def _shares(self, T_cam_model: NDArray[np.float64], model: BareModel) -> NDArray[np.float64]:
+        """Bare and spilled (2, b) of each placement (b, 4, 4)."""
         tolerance = self._search.alignment_score.tolerance
-        return np.array(
-            [
-                bare_and_spilled(T, model, self._silhouette, tolerance, self._config)
-                for T in placed.T_cam_model
-            ]
-        ).T
+        shares = [
+            bare_and_spilled(T, model, self._mask.silhouette, tolerance, self._config.silhouette)
+            for T in T_cam_model
+        ]
+        return np.array(shares).reshape(-1, 2).T
 
 
 def bare_model(arrays: dict[str, NDArray[Any]], points: int) -> BareModel:

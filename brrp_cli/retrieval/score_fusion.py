@@ -4,7 +4,7 @@ For object i of the frame, stored object c and light g, with n stored objects:
 
     s_i(c, g) = offset + colour (B_i(c, g) - 1) + pairs (1 - h_i) (D_i(c) - 1) + size Z_i(c)
                 + [alignment (A_i(c) - A_i) + fit_i (A_i - usual)] m_i / (m_i + points)
-                - bare_i min(b_i(c), most_bare) - spilled_i min(o_i(c), most_spilled)
+                - bare_i min(b_i(c), most_bare) - spilled_i ln(1 + o_i(c))
                 - crowding ln n,    fit_i = fit min(1, wave / w), and so bare_i, spilled_i
 
 B and D are Bhattacharyya coefficients of colours and of point pairs, in [0, 1], h the hidden share
@@ -88,7 +88,7 @@ def against_silhouettes(
 ) -> NDArray[np.float64]:
     """What the silhouettes of placements say against them, nats: see `Similarity`."""
     unlike = weights.bare * np.minimum(bare, weights.most_bare)
-    unlike = unlike + weights.spilled * np.minimum(spilled, weights.most_spilled)
+    unlike = unlike + weights.spilled * np.log1p(spilled)
     return np.asarray(_clear(wave, weights) * unlike, dtype=np.float64)
 
 

@@ -31,14 +31,14 @@ class Shortlist:
     def rows(self, seen: SeenObject, histograms: NDArray[np.floating] | None) -> NDArray[np.int64]:
         """Rows (m,) of the table that are to be looked at, ascending."""
         own, weights = self._config.shortlist, self._config.likeness
-        neutral = self._config.similarity.neutral_colour
+        plain = self._config.similarity.plain_colour
         if len(self._all) <= own.closely:
             return self._all
         score = np.zeros(len(self._all), np.float32)
         if histograms is not None:
             lit = np.sqrt(histograms[:: own.light_step], dtype=np.float32)
             colour = _best_alike(self._first.colour, lit)
-            colour[self.plain] = neutral
+            colour[self.plain] = plain
             score += np.float32(weights.colour) * colour
         if seen.pairs is not None:
             pairs = _best_alike(self._first.pairs, np.sqrt(seen.pairs, dtype=np.float32)[None])

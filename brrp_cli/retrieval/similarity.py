@@ -21,15 +21,17 @@ def colour_likeness(
     config: SimilarityConfig,
 ) -> NDArray[np.float32]:
     """Bhattacharyya coefficient (g, m) of the most similar view, for histograms (g, b) of what is
-    seen in g lights and stored views (m, v, b). Neutral where either has no colours."""
+    seen in g lights and stored views (m, v, b); where either has no colours, `neutral_colour` or
+    `plain_colour`."""
     count, views, bins = stored.shape
     if histograms is None:
         return np.full((lights, count), config.neutral_colour, np.float32)
     seen = np.sqrt(blurred(histograms, config.blur))
-    known = np.square(roots(stored.reshape(count * views, bins)))
+    coloured = stored.any(axis=(1, 2))
+    known = np.square(roots(stored[coloured].reshape(-1, bins)))
     alike = seen @ np.sqrt(blurred(known, config.blur)).T
-    found = np.asarray(alike.reshape(len(seen), count, views).max(axis=-1))
-    found[:, ~stored.any(axis=(1, 2))] = config.neutral_colour
+    found = np.full((len(seen), count), config.plain_colour, np.float32)
+    found[:, coloured] = alike.reshape(len(seen), -1, views).max(axis=-1, initial=0)
     return found
 
 

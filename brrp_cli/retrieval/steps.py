@@ -2,23 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
 from brrp_cli.config import Config
+from brrp_cli.config.retrieval import RetrievalConfig
 from brrp_cli.frames.frame import Frame
 from brrp_cli.observation.support_plane import Plane
 from brrp_cli.prior.store import Prior
-from brrp_cli.retrieval.aligned import Aligner
+from brrp_cli.retrieval.aligned import Aligner, SeenPart, Shares
 from brrp_cli.retrieval.illuminants import lights
 from brrp_cli.retrieval.observed_appearance import see_object
 from brrp_cli.retrieval.placed_objects import PlacedObjects
-from brrp_cli.retrieval.score_fusion import Similarity, by_shape, looks_difference
-from brrp_cli.retrieval.shortlist import Shortlist, kinds
+from brrp_cli.retrieval.rounds import Rounds, alike
+from brrp_cli.retrieval.score_fusion import Similarity, against_silhouettes
+from brrp_cli.retrieval.shortlist import Shortlist
 from brrp_cli.retrieval.similarity import lit_histograms, similarity
 
 
@@ -39,7 +40,13 @@ class Steps:
         self.aligns = len(prior.names) >= own.alignment.from_objects
         self._similarity = own.similarity
         if not self.aligns:
-            self._similarity = replace(own.similarity, blur=0.0, least_pairs=0.0, size_most=np.inf)
+            self._similarity = replace(
+                own.similarity,
+                plain_colour=own.similarity.neutral_colour,
+                blur=0.0,
+                least_pairs=0.0,
+                size_most=np.inf,
+            )
 
     def __reduce__(self) -> tuple[Callable[..., Steps], tuple[Prior, Config, int]]:
         return _steps, self._made_of
@@ -66,45 +73,23 @@ class Steps:
         """With the alignment scores of the objects that are `likely` (m,) by their looks; in haste,
         of fewer of them."""
         prior, config, seed = self._made_of
-        own = config.retrieval.alignment
-        if image.plane is None or len(points) < own.least_points:
+        own, fusion = config.retrieval.alignment, config.retrieval.fusion
+        if image.plane is None:
             return replace(look, alignment=own.neutral)
 
-        alike = np.argsort(-likely, kind="stable")
-        alike = alike[likely[alike] > likely.max() * np.exp(-own.margin)]
-        ranked = [alike[kind] for kind in kinds(self._shortlist.plain[look.rows[alike]])]
+        def against(bare: Shares, spilled: Shares) -> Shares:
+            nats = against_silhouettes(bare, spilled, image.wave, fusion)
+            return nats / max(fusion.alignment, 1.0)
+
         shuffled = points[np.random.default_rng(seed).permutation(len(points))]
-        seen = self._aligner.on(shuffled, image.frame, object_id, image.plane, image.wave)
+        seen = self._aligner.on(shuffled, image.frame, object_id, image.plane, image.wave, against)
         names = [prior.names[row] for row in look.rows]
-        placed = PlacedObjects(seen, names, image.wave, config.retrieval)
-        fusion = config.retrieval.fusion
-        looks = np.log(np.maximum(likely, np.finfo(float).tiny))
-        shape = by_shape(look, config.retrieval.likeness)
-        counted = looks + looks_difference(look, config.retrieval.likeness, fusion)
-        ends = np.cumsum(own.tried[: own.hasty_rounds] if hasty else own.tried).tolist()
-        for begin, end in pairwise([0, *ends]):
-            # In the prior's order, in which shards hold them.
-            tried = np.sort(np.concatenate([kind[begin:end] for kind in ranked]))
-            first = placed.tried(tried)
-            promise = looks[tried] + own.first * first
-            order = tried[np.argsort(-promise, kind="stable")]
-            for chosen in (order[: own.most], order[own.most : own.most + own.more]):
-                placed.refine(chosen)
-                against = fusion.alignment * (1 - placed.agreed) - shape
-                if against.min() <= own.certain:
-                    break
-            left = np.concatenate([kind[end:] for kind in ranked])
-            # With a score of 1, the best there is, none of those left would be the most probable.
-            best = (counted + fusion.alignment * placed.agreed).max()
-            if best > counted[left].max(initial=-np.inf) + fusion.alignment:
-                break
-            if against.min() <= own.certain:
-                break
-        promise = looks + own.first * placed.agreed
-        promise[placed.alignment <= own.lowest] = -np.inf
-        last = np.argsort(-promise, kind="stable")[: own.last]
-        last = np.sort(last[np.isfinite(promise[last])])
-        placed.finish(last)
+        if len(points) < own.least_points:
+            rows = np.sort(alike(likely, own.margin))
+            return _by_mask(look, rows, seen, names, image.wave, config.retrieval)
+        placed = PlacedObjects(seen, names, against, own)
+        plain = self._shortlist.plain[look.rows]
+        Rounds(placed, look, likely, plain, config.retrieval).run(hasty)
         return replace(
             look,
             alignment=placed.alignment,
@@ -112,6 +97,23 @@ class Steps:
             spilled=placed.spilled,
             wave=image.wave,
         )
+
+
+def _by_mask(
+    look: Similarity,
+    rows: NDArray[np.int64],
+    seen: SeenPart,
+    names: Sequence[str],
+    wave: float,
+    config: RetrievalConfig,
+) -> Similarity:
+    """With the silhouettes of some objects (r,) of `names` that are placed by the mask alone; the
+    others count as not at all like it. In the prior's order, in which shards hold them."""
+    fusion = config.fusion
+    bare = np.full(len(names), fusion.most_bare, np.float32)
+    spilled = np.ones(len(names), np.float32)
+    bare[rows], spilled[rows] = seen.silhouettes_by_mask([names[row] for row in rows])
+    return replace(look, alignment=config.alignment.neutral, bare=bare, spilled=spilled, wave=wave)
 
 
 @dataclass(frozen=True)

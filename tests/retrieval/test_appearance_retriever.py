@@ -215,10 +215,12 @@ def test_silhouettes_choose_among_the_placements_of_an_object(prior):
     def off(object_id, worth):
         """What the placements that are kept leave bare and cover beside the mask, in all."""
         points = np.random.default_rng(0).permutation(frame.object_points(object_id))
-        seen = Aligner(prior, own).on(points, frame, object_id, plane, 0.0)
+        seen = Aligner(prior, own).on(
+            points, frame, object_id, plane, 0.0, lambda bare, spilled: worth * (bare + spilled)
+        )
         seen.first_scores(prior.names)
         seen.scores(prior.names)
-        seen.last_scores(prior.names, own.finest, lambda bare, spilled: worth * (bare + spilled))
+        seen.last_scores(prior.names)
         return seen.silhouettes(prior.names).sum()
 
     against, unasked, wished = (sum(off(i, worth) for i in names) for worth in (100.0, 0.0, -100.0))
@@ -233,11 +235,11 @@ def test_more_objects_are_tried_until_one_lies_well(prior):
         found = aligner.evidence(frame)
         return {i: int((found[i].alignment > 0.1).sum()) for i in (*names, STRANGER)}
 
-    assert set(aligned(tried=(1,)).values()) == {1}
+    assert set(aligned(tried=1, glanced=()).values()) == {1}
     # The stranger lies well on nothing, so that all are tried; the others end with their own.
-    until = aligned(tried=(1,) * 5, certain=6.0)
+    until = aligned(tried=1, glanced=(1,) * 4, certain=6.0)
     assert until[STRANGER] > max(until[i] for i in names) == 1
-    assert min(aligned(tried=(2,), certain=0.0).values()) > 1
+    assert min(aligned(tried=2, glanced=(), certain=0.0).values()) > 1
 
 
 def test_rounds_end_where_none_of_those_left_could_become_the_most_probable(prior):
@@ -245,7 +247,14 @@ def test_rounds_end_where_none_of_those_left_could_become_the_most_probable(prio
 
     def aligned(worth):
         aligner = retriever_of(
-            prior, True, tried=(1,) * 5, margin=100.0, unaligned=0.1, certain=0.0, worth=worth
+            prior,
+            True,
+            tried=1,
+            glanced=(1,) * 4,
+            margin=100.0,
+            unaligned=0.1,
+            certain=0.0,
+            worth=worth,
         )
         found = aligner.evidence(frame)
         return {i: int((found[i].alignment > 0.1).sum()) for i in names}
@@ -257,10 +266,73 @@ def test_rounds_end_where_none_of_those_left_could_become_the_most_probable(prio
     assert sum(tried > 1 for tried in many.values()) >= len(names) - 1
 
 
+def test_at_a_glance_the_true_object_lies_best(prior):
+    config = preset("default")
+    frame, names = scene()
+    plane = scene_plane(frame, config.observation, 0)
+    aligner = Aligner(prior, config.retrieval.alignment)
+    for object_id, name in names.items():
+        points = np.random.default_rng(0).permutation(frame.object_points(object_id))
+        seen = aligner.on(points, frame, object_id, plane, 0.0, lambda bare, spilled: 0 * bare)
+        best = prior.names[int(seen.glances(prior.names).argmax())]
+        assert best == name or {best, name} == {"red_box", "blue_box"}
+
+
+def test_what_looks_do_not_find_a_glance_finds(prior):
+    """Where all look alike, one of them is tried first, and then the one that lies best."""
+    frame, names = scene()
+    config = preset("default")
+    blind = {"colour": 0.0, "pairs": 0.0, "size": 0.0}
+    own = config.retrieval
+
+    def found(**numbers):
+        alignment = dataclasses.replace(
+            own.alignment, from_objects=1, tried=1, certain=0.0, **numbers
+        )
+        retrieval = dataclasses.replace(
+            own,
+            alignment=alignment,
+            likeness=dataclasses.replace(own.likeness, **blind),
+            fusion=dataclasses.replace(own.fusion, **blind),
+        )
+        retriever = AppearanceRetriever(prior, dataclasses.replace(config, retrieval=retrieval), 0)
+        best = {i: prior.names[retriever.probabilities(frame, i).argmax()] for i in names}
+        boxes = {"red_box", "blue_box"}
+        return {i for i, name in best.items() if name == names[i] or {name, names[i]} == boxes}
+
+    assert found(glanced=(1,)) == set(names) > found(glanced=())
+
+
+@pytest.mark.parametrize("kept", [0.0, 0.2])
+def test_where_depth_shows_nothing_or_little_the_mask_tells(prior, aligner, kept):
+    """Without colours, so that only the silhouette is left."""
+    frame, names = scene()
+    grey = np.full_like(frame.rgb, 127)
+    lost = np.random.default_rng(0).random(frame.shape) >= kept
+    for object_id, name in names.items():
+        points = frame.points.copy()
+        points[(frame.segmap == object_id) & lost] = np.nan
+        blind = dataclasses.replace(frame, points=points, rgb=grey)
+        look = aligner.evidence(blind)[object_id]
+        assert (look.points == 0) == (kept == 0)
+        own = look.rows.tolist().index(prior.names.index(name))
+        assert look.bare[own] < 0.1 and look.spilled[own] < 0.1
+        odd = look.bare + look.spilled
+        best = prior.names[look.rows[odd.argmin()]]
+        assert best == name or {best, name} == {"red_box", "blue_box"} or odd[own] < 0.03
+
+
 def test_in_haste_fewer_objects_are_tried_and_what_is_known_is_used(prior):
     frame, _ = scene()
     aligner = retriever_of(
-        prior, True, tried=(1,) * 5, margin=100.0, unaligned=0.1, certain=0.0, worth=10_000.0
+        prior,
+        True,
+        tried=1,
+        glanced=(1,) * 4,
+        margin=100.0,
+        unaligned=0.1,
+        certain=0.0,
+        worth=10_000.0,
     )
 
     def tried():

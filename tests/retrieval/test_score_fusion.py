@@ -95,20 +95,21 @@ def test_alignment_with_few_points_counts_less():
 
 
 def test_silhouettes_speak_against_placements():
-    """Log odds 8 - 10 * 0.2 - ln 2 and 8 - 10 * 0.1 - 4 * 0.3 - ln 2; beyond 0.3 no more."""
-    weights = replace(WEIGHTS, bare=10.0, spilled=4.0, most_bare=0.3, most_spilled=0.3)
+    """Log odds 8 - 10 * 0.2 - ln 2 and 8 - 10 * 0.3 - 4 ln(1 + 0.5) - ln 2: what is bare beyond
+    0.3 counts no more."""
+    weights = replace(WEIGHTS, bare=10.0, spilled=4.0, most_bare=0.3)
     item = replace(
         seen([[1.0, 1.0]]),
-        bare=np.array([0.2, 0.1], np.float32),
-        spilled=np.array([0.0, 5.0], np.float32),
+        bare=np.array([0.2, 0.9], np.float32),
+        spilled=np.array([0.0, 0.5], np.float32),
     )
     found = believe([item], np.zeros(1), np.eye(1), 2, weights)[0]
-    odds = np.exp([6.0, 5.8]) / 2
+    odds = np.exp([6.0, 5 - 4 * np.log(1.5)]) / 2
     np.testing.assert_allclose(found, odds / (1 + odds.sum()), rtol=1e-5)
     # Waves twice as high as `wave`: half of it.
     wavy = replace(item, wave=2 * weights.wave)
     found = believe([wavy], np.zeros(1), np.eye(1), 2, weights)[0]
-    odds = np.exp([7.0, 6.9]) / 2
+    odds = np.exp([7.0, 6.5 - 2 * np.log(1.5)]) / 2
     np.testing.assert_allclose(found, odds / (1 + odds.sum()), rtol=1e-5)
 
 

@@ -99,7 +99,7 @@ def test_objects_without_colours_are_neither_preferred_nor_refused():
     stored[1, :, 5] = 255
     seen = np.eye(COLOUR_BINS)[[5, 150]]
     np.testing.assert_allclose(
-        colour_likeness(seen, stored, 2, LIKE), [[LIKE.neutral_colour, 1], [LIKE.neutral_colour, 0]]
+        colour_likeness(seen, stored, 2, LIKE), [[LIKE.plain_colour, 1], [LIKE.plain_colour, 0]]
     )
     np.testing.assert_allclose(colour_likeness(None, stored, 4, LIKE), LIKE.neutral_colour)
 
