@@ -78,7 +78,7 @@ class SimilarityConfig:
     """
 
     neutral_colour: float = share(0.93)
-    plain_colour: float = share(0.91)
+    plain_colour: float = share(0.9)
     neutral_pairs: float = share(0.97)
     blur: float = share(0.2)
     least_pairs: float = share(0.8)

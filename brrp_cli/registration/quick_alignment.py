@@ -40,6 +40,17 @@ class Aligned:
         """So many of them."""
         return Aligned(self.T_cam_model[:count], self.scores[:count])
 
+    def after(self, count: int) -> Aligned:
+        """Those after so many."""
+        return Aligned(self.T_cam_model[count:], self.scores[count:])
+
+    def followed_by(self, others: Aligned) -> Aligned:
+        """These, and others after them."""
+        return Aligned(
+            np.concatenate([self.T_cam_model, others.T_cam_model]),
+            np.concatenate([self.scores, others.scores]),
+        )
+
     def ordered(self, values: Array) -> Aligned:
         """The first (n,) placements, those with the largest values (n,) first."""
         order = np.argsort(-values, kind="stable")

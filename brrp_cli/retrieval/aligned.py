@@ -179,7 +179,7 @@ class SeenPart:
         """Alignment scores (m,) of objects that `first_scores` was asked for."""
         models = self._aligner.models(names)
         first = [self._first[name] for name in names]
-        ordered = self._agreeing if self._mask.blind else None
+        ordered = self._best_agreeing if self._mask.blind else None
         placed = aligned(models, first, self._verifier, self._search, ordered)
         self._placed.update(zip(names, placed, strict=True))
         return np.array([each.score for each in placed])
@@ -221,17 +221,20 @@ class SeenPart:
         first = first_placements(model, self._verifier, self._search)
         if not self._mask.blind:
             return first, 0.0
-        first = first.first(self._search.fine)
         T = self._by_mask(model)
         scores = coarse_score(T, model, self._verifier, self._search)
-        both = Aligned(
-            np.concatenate([first.T_cam_model, T]), np.concatenate([first.scores, scores])
-        )
-        both = self._agreeing(both, model)
-        return both, float(self._against(*self._shares(both.T_cam_model[:1], model))[0])
+        best, rest = first.first(self._search.fine), first.after(self._search.fine)
+        both = self._agreeing(best.followed_by(Aligned(T, scores)), model)
+        against = self._against(*self._shares(both.T_cam_model[:1], model))
+        return both.followed_by(rest), float(against[0])
 
     def _by_mask(self, model: BareModel) -> NDArray[np.float64]:
         return poses_from_mask(model, self._mask.outline, self._config.by_mask)
+
+    def _best_agreeing(self, placed: Aligned, model: BareModel) -> Aligned:
+        """The same of those with the best scores, twice as many as are refined further."""
+        most = 2 * self._search.fine
+        return self._agreeing(placed.first(most), model).followed_by(placed.after(most))
 
     def _agreeing(self, placed: Aligned, model: BareModel) -> Aligned:
         """The placements whose scores and silhouettes are best first."""
