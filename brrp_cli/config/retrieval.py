@@ -111,9 +111,9 @@ class AlignmentConfig:
     neutral : alignment score where nothing can be aligned: about what an object that is rightly
         found has; unaligned : that of objects that were not among those; lowest : a lower score
         counts as that one
-    search : how they are placed (registration/quick_alignment.py); glance_turns, glance_steps : its
-        `turns` and `begun_steps` at a glance (registration/glance.py); finest : its `fine` steps in
-        the end; silhouette : how their silhouettes are held against the mask
+    search : how they are placed (registration/quick_alignment.py); glance : how they are placed at
+        a glance (registration/glance.py); finest : its `fine` steps in the end; silhouette : how
+        their silhouettes are held against the mask
     blind : share of a mask's pixels that have depth, below which the mask tells too where objects
         may lie, as `by_mask` says (registration/mask_poses.py)
     waves : deviations of the waves of the frame's depth (`sensor`), by which the true object may be
@@ -122,7 +122,7 @@ class AlignmentConfig:
 
     from_objects: int = 100
     tried: int = 24
-    glanced: tuple[int, ...] = (60, 60)
+    glanced: tuple[int, ...] = (64, 80)
     certain: float = between(5.5, 0.0, 1000.0)
     distinct: float = share(0.5)
     margin: float = 12.0
@@ -153,8 +153,17 @@ class AlignmentConfig:
             fine_steps=6,
         )
     )
-    glance_turns: int = 16
-    glance_steps: int = 3
+    glance: SearchConfig = field(
+        default_factory=lambda: SearchConfig(
+            turns=16,
+            rotations=0,
+            box_points=200,
+            model_points=100,
+            seen_points=100,
+            first_share=2,
+            begun_steps=3,
+        )
+    )
     finest: SearchConfig = field(
         default_factory=lambda: SearchConfig(fine=2, fine_points=800, fine_steps=8)
     )

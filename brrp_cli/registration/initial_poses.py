@@ -31,11 +31,21 @@ def resting_initial_poses(
     """
     if not model.resting:
         return np.zeros((0, 4, 4))
-    T = _resting_and_turned(model, config)
-    longest = _longest(np.stack(model.resting), model.surface[: config.model_points])
-    directions = turns(config.turns)[:, :2, :2] @ longest[:, None, :, None]
-    directions = directions[..., 0].reshape(-1, 2)
-    reach = _lay_over(T, model, footprint, directions, config)
+    turned = turns(config.turns)
+    resting = np.stack(model.resting)
+    T = (turned @ resting[:, None]).reshape(-1, 4, 4)
+    surface = model.surface[: config.model_points]
+    longest = _longest(resting, surface)
+    directions = (turned[:, :2, :2] @ longest[:, None, :, None])[..., 0].reshape(-1, 2)
+    reach = lay_over(
+        T,
+        surface,
+        model.normals[: config.model_points],
+        footprint.middle,
+        footprint.T_plane_cam[:3, 3],
+        directions,
+        config.least_facing,
+    )
     more = reach - footprint.extent(directions)
     longer = np.flatnonzero(more > config.hidden)
     way = more[longer, None] / 2 * directions[longer]
@@ -44,41 +54,6 @@ def resting_initial_poses(
     # Each is followed by itself over either end.
     order = np.argsort(np.concatenate([np.arange(len(T)), longer, longer]), kind="stable")
     return np.asarray(np.linalg.inv(footprint.T_plane_cam) @ np.concatenate([T, ends])[order])
-
-
-def resting_over_the_middle(
-    model: ModelGeometry, footprint: Footprint, config: SearchConfig
-) -> Array:
-    """Those (b, 4, 4) of `resting_initial_poses` that lie over the middle of what is seen."""
-    if not model.resting:
-        return np.zeros((0, 4, 4))
-    T = _resting_and_turned(model, config)
-    _lay_over(T, model, footprint, np.zeros((len(T), 2)), config)
-    return np.asarray(np.linalg.inv(footprint.T_plane_cam) @ T)
-
-
-def _resting_and_turned(model: ModelGeometry, config: SearchConfig) -> Array:
-    """T_plane_model (B, 4, 4)."""
-    return (turns(config.turns) @ np.stack(model.resting)[:, None]).reshape(-1, 4, 4)
-
-
-def _lay_over(
-    T_plane_model: Array,
-    model: ModelGeometry,
-    footprint: Footprint,
-    directions: Array,
-    config: SearchConfig,
-) -> Array:
-    """See `lay_over`."""
-    return lay_over(
-        T_plane_model,
-        model.surface[: config.model_points],
-        model.normals[: config.model_points],
-        footprint.middle,
-        footprint.T_plane_cam[:3, 3],
-        directions,
-        config.least_facing,
-    )
 
 
 def feature_matched_poses(

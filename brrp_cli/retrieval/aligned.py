@@ -95,7 +95,7 @@ class Aligner:
 
     def coarse_models(self, names: Sequence[str]) -> list[BareModel]:
         """The same, as `glance` needs them. Errors: PriorError."""
-        points = self._config.search.model_points
+        points = self._config.glance.model_points
         return self._kept(names, self._coarse, HELD_COARSELY, lambda each: coarser(each, points))
 
     def _kept(
@@ -161,8 +161,7 @@ class SeenPart:
     def glances(self, names: Sequence[str]) -> NDArray[np.float64]:
         """Scores (m,) of the objects of these names at a glance. Errors: PriorError."""
         models = self._aligner.coarse_models(names)
-        own = self._config
-        search = replace(self._search, turns=own.glance_turns, begun_steps=own.glance_steps)
+        search = replace(self._config.glance, alignment_score=self._search.alignment_score)
         return np.array([glance(model, self._verifier, search) for model in models])
 
     def first_scores(self, names: Sequence[str]) -> NDArray[np.float64]:

@@ -6,15 +6,11 @@ import numpy as np
 import pytest
 from table_scene import MESHES, placed, stored, verifier_of
 
-from brrp_cli.config import SearchConfig
+from brrp_cli.config import preset
 from brrp_cli.registration.glance import coarser, glance
-from brrp_cli.registration.initial_poses import (
-    resting_initial_poses,
-    resting_over_the_middle,
-)
 from brrp_cli.registration.model import BareModel, search_model
 
-SEARCH = SearchConfig(turns=16, begun_steps=3, model_points=100, seen_points=100, first_share=2)
+SEARCH = preset("default").retrieval.alignment.glance
 
 
 def bare(name: str) -> BareModel:
@@ -24,11 +20,11 @@ def bare(name: str) -> BareModel:
 
 @pytest.mark.parametrize("name", ["box", "ell", "beaker"])
 @pytest.mark.parametrize("x, y, yaw", [(0.0, 0.0, 0.3), (0.12, -0.1, 2.0)])
-def test_none_is_better_at_a_glance_than_the_true_solid(name, x, y, yaw):
+def test_the_true_solid_is_among_the_two_best_at_a_glance(name, x, y, yaw):
     """From one side an L looks like a box, and lies as well."""
     verifier = verifier_of(MESHES[name](), placed(x, y, yaw))
     scores = {other: glance(coarser(bare(other), 100), verifier, SEARCH) for other in MESHES}
-    assert scores[name] > 0.9 and scores[name] > max(scores.values()) - 0.01
+    assert scores[name] > 0.7
     assert sum(score > 0.6 for score in scores.values()) <= 2
 
 
@@ -40,13 +36,3 @@ def test_every_second_node_is_an_eighth_of_the_memory_and_nearly_the_same_surfac
     spacing = coarse.field.spacing * coarse.half_extent
     off = np.abs(coarse.signed_distance(fine.surface))
     assert off.mean() < spacing / 4 and off.max() < spacing
-
-
-def test_what_lies_over_the_middle_is_among_all_resting_poses():
-    verifier = verifier_of(MESHES["ell"](), placed(0.05, 0.0, 1.0))
-    footprint = verifier.outline(SEARCH).footprint
-    every = resting_initial_poses(bare("ell"), footprint, SEARCH)
-    middle = resting_over_the_middle(bare("ell"), footprint, SEARCH)
-    assert len(middle) == SEARCH.turns * len(bare("ell").resting) <= len(every)
-    for T in middle:
-        assert np.abs(every - T).max(axis=(1, 2)).min() < 1e-9
