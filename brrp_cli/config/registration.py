@@ -189,7 +189,7 @@ class SearchConfig:
     """
 
     turns: int = 24
-    rotations: int = 200
+    rotations: int = between(200, 0, 100_000)
     model_points: int = 300
     least_facing: int = 6
     stray: float = share(0.02)
