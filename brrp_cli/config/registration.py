@@ -229,7 +229,7 @@ class SearchConfig:
     beaten: float = 0.3
     settled: float = 0.9
     distinct: float = 0.0015
-    kept: int = 8
+    kept: int = 6
     explained: float = 0.85
     unlikely: float = share(0.05)
     alignment_score: VerificationConfig = field(default_factory=VerificationConfig)

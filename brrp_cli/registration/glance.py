@@ -1,5 +1,5 @@
-"""A glance at how well a model could be placed, in a millisecond or two: no more than tells which
-of a thousand are worth a search.
+"""A glance at how well a model could be placed, in a few milliseconds: no more than tells which of
+a thousand are worth a search.
 
 Colours, point pairs and size do not tell that of plain things: of random shapes that were seen in
 full, some were beyond the 600th of 922 by those.

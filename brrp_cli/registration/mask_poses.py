@@ -20,6 +20,9 @@ from brrp_cli.registration.model import ModelGeometry
 
 Array = NDArray[np.float64]
 
+# Metres; what is nearer to the camera is not seen.
+NEAREST = 0.01
+
 
 @dataclass(frozen=True)
 class MaskOutline:
@@ -123,10 +126,6 @@ def _shifted(
     off = np.abs(gap).mean(axis=1) / max(seen.size, 1.0)
     off[(here[..., 2] <= NEAREST).any(axis=1)] = np.inf
     return T, off
-
-
-# Metres; what is nearer to the camera is not seen.
-NEAREST = 0.01
 
 
 def _below(seen: MaskOutline, heights: Array) -> Array:

@@ -33,7 +33,7 @@ class Aligned:
 
     @property
     def score(self) -> float:
-        """That of the best placement."""
+        """That of the first placement."""
         return float(self.scores[0])
 
     def first(self, count: int) -> Aligned:

@@ -20,6 +20,8 @@ from brrp_cli.retrieval.base import hasty, helped, one_image, sendable, unknown
 
 PLACES = {3: (-0.15, 0.1), 4: (0.12, 0.14), 8: (0.0, -0.02), 9: (0.2, -0.1), 11: (-0.2, -0.14)}
 STRANGER = 20
+# Rounds of one object each, none of which ends them.
+ONE_BY_ONE = {"tried": 1, "glanced": (1,) * 4, "margin": 100.0, "unaligned": 0.1, "certain": 0.0}
 
 
 @pytest.fixture(scope="module")
@@ -246,16 +248,7 @@ def test_rounds_end_where_none_of_those_left_could_become_the_most_probable(prio
     frame, names = scene()
 
     def aligned(worth):
-        aligner = retriever_of(
-            prior,
-            True,
-            tried=1,
-            glanced=(1,) * 4,
-            margin=100.0,
-            unaligned=0.1,
-            certain=0.0,
-            worth=worth,
-        )
+        aligner = retriever_of(prior, True, worth=worth, **ONE_BY_ONE)
         found = aligner.evidence(frame)
         return {i: int((found[i].alignment > 0.1).sum()) for i in names}
 
@@ -324,16 +317,7 @@ def test_where_depth_shows_nothing_or_little_the_mask_tells(prior, aligner, kept
 
 def test_in_haste_fewer_objects_are_tried_and_what_is_known_is_used(prior):
     frame, _ = scene()
-    aligner = retriever_of(
-        prior,
-        True,
-        tried=1,
-        glanced=(1,) * 4,
-        margin=100.0,
-        unaligned=0.1,
-        certain=0.0,
-        worth=10_000.0,
-    )
+    aligner = retriever_of(prior, True, worth=10_000.0, **ONE_BY_ONE)
 
     def tried():
         return int((aligner.evidence(frame)[STRANGER].alignment > 0.1).sum())
