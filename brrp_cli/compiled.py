@@ -9,9 +9,13 @@ source, or in the user's cache folder.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TypeVar, cast
+from typing import Any, TypeVar, cast
 
 from numba import njit
+
+# Sums may be taken in any order, and a division by 0 is no error: only then are several turns of a
+# loop done at a time.
+FREELY: dict[str, Any] = {"error_model": "numpy", "fastmath": {"reassoc", "contract", "nsz"}}
 
 F = TypeVar("F", bound=Callable[..., object])
 
@@ -20,6 +24,12 @@ def compiled(function: F) -> F:
     """`function` of numbers and arrays, compiled. What it calls is in its own file: a change
     elsewhere would not be seen, and the kept code used on."""
     try:
-        return cast(F, njit(cache=True, nogil=True)(function))
+        return cast(F, njit(cache=True, nogil=True, **FREELY)(function))
     except RuntimeError:  # there is no folder to keep it in
-        return cast(F, njit(nogil=True)(function))
+        return cast(F, njit(nogil=True, **FREELY)(function))
+
+
+def inlined(function: F) -> F:
+    """`function`, compiled into those of its file that call it, also where it is long: a loop with
+    a call in it does one point after the other."""
+    return cast(F, njit(nogil=True, forceinline=True, **FREELY)(function))

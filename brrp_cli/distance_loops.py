@@ -2,20 +2,29 @@
 
 A grid has nodes lower + spacing * (i, j, k). Distances between nodes are trilinear; off the grid,
 that of its nearest point and the way there. All in one file: see `compiled`.
+
+The inner loops have no branches and no calls, so that the compiler does several points at a time,
+and are in single precision. Sums of many points are in double.
 """
 
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from brrp_cli.compiled import compiled
+from brrp_cli.compiled import compiled, inlined
 
 Array = NDArray[np.float64]
 Floats = NDArray[np.float32]
+# A number in single precision. NumPy's own type of it takes no part in `min` and `max`.
+Single = Any
 
+ZERO, ONE = np.float32(0), np.float32(1)
+# What a divisor is at least, where 0 would do no harm but for the warning.
+NEXT_TO_NOTHING = np.float32(1e-20)
 # What rounding leaves of a positive number that is next to nothing.
 TINY = 1e-30
 # A ray that is followed through distances: metres that it goes on at least, and how often.
@@ -23,58 +32,59 @@ SHORTEST_STEP = 0.001
 LONGEST_WALK = 60
 
 
-@compiled
-def _cell(at: float, count: int) -> tuple[int, float, float]:
+@inlined
+def _cell(at: Single, count: int) -> tuple[Single, Single, Single]:
     """Of a coordinate in nodes: its cell, how far along that it lies, and how far off the grid."""
-    within = min(max(at, 0.0), count - 1.0)
-    cell = min(int(within), count - 2)
+    within = min(max(at, ZERO), np.float32(count - 1))
+    cell = min(np.floor(within), np.float32(count - 2))
     return cell, within - cell, at - within
 
 
-@compiled
+@inlined
 def _corners(
-    values: Floats, shape: tuple[int, int, int], i: int, j: int, k: int
-) -> tuple[float, float, float, float, float, float, float, float]:
+    values: Floats, shape: tuple[int, int, int], i: Single, j: Single, k: Single
+) -> tuple[Single, Single, Single, Single, Single, Single, Single, Single]:
     """Distances at the corners of a cell, the last axis first; values : of all nodes in a row."""
-    # Numbers without a sign need no check whether they count from the end.
-    first = np.uintp((i * shape[1] + j) * shape[2] + k)
+    node = (i * np.float32(shape[1]) + j) * np.float32(shape[2]) + k
+    # Exact up to 2^24; a field has some 60,000 nodes. Numbers without a sign need no check whether
+    # they count from the end.
+    first = np.uintp(np.uint32(np.int32(node)))
     one, row, layer = np.uintp(1), np.uintp(shape[2]), np.uintp(shape[1] * shape[2])
     second, third, fourth = first + row, first + layer, first + layer + row
     return (
-        float(values[first]),
-        float(values[first + one]),
-        float(values[second]),
-        float(values[second + one]),
-        float(values[third]),
-        float(values[third + one]),
-        float(values[fourth]),
-        float(values[fourth + one]),
+        values[first],
+        values[first + one],
+        values[second],
+        values[second + one],
+        values[third],
+        values[third + one],
+        values[fourth],
+        values[fourth + one],
     )
 
 
-@compiled
+@inlined
 def _distance(
-    values: Floats, shape: tuple[int, int, int], spacing: float, x: float, y: float, z: float
-) -> float:
+    values: Floats, shape: tuple[int, int, int], spacing: Single, x: Single, y: Single, z: Single
+) -> Single:
     """At a point in nodes; values : of all nodes in a row. `_look_up` for those who need no
-    gradient, in half the time."""
+    gradient."""
     i, x, off_x = _cell(x, shape[0])
     j, y, off_y = _cell(y, shape[1])
     k, z, off_z = _cell(z, shape[2])
     a, a1, b, b1, c, c1, d, d1 = _corners(values, shape, i, j, k)
     a, b, c, d = a + z * (a1 - a), b + z * (b1 - b), c + z * (c1 - c), d + z * (d1 - d)
     near, far = a + y * (b - a), c + y * (d - c)
-    off = off_x * off_x + off_y * off_y + off_z * off_z
-    value = near + x * (far - near)
-    return value + math.sqrt(off) * spacing if off > 0 else value
+    off = np.sqrt(off_x * off_x + off_y * off_y + off_z * off_z)
+    return near + x * (far - near) + off * spacing
 
 
-@compiled
+@inlined
 def _look_up(
-    values: Floats, shape: tuple[int, int, int], spacing: float, x: float, y: float, z: float
-) -> tuple[float, float, float, float]:
+    values: Floats, shape: tuple[int, int, int], spacing: Single, x: Single, y: Single, z: Single
+) -> tuple[Single, Single, Single, Single]:
     """Distance and gradient at a point in nodes; values : of all nodes in a row."""
-    nodes = 1 / spacing
+    nodes = ONE / spacing
     i, x, off_x = _cell(x, shape[0])
     j, y, off_y = _cell(y, shape[1])
     k, z, off_z = _cell(z, shape[2])
@@ -84,23 +94,20 @@ def _look_up(
     left, right = b - a, d - c
     near, far = a + y * left, c + y * right
     up_near, up_far = rise_a + y * (rise_b - rise_a), rise_c + y * (rise_d - rise_c)
-    value = near + x * (far - near)
-    gx = (far - near) * nodes
-    gy = (left + x * (right - left)) * nodes
-    gz = (up_near + x * (up_far - up_near)) * nodes
-    if off_x != 0 or off_y != 0 or off_z != 0:
-        way = math.sqrt(off_x * off_x + off_y * off_y + off_z * off_z)
-        value += way * spacing
-        gx = off_x / way if off_x != 0 else gx
-        gy = off_y / way if off_y != 0 else gy
-        gz = off_z / way if off_z != 0 else gz
-    return value, gx, gy, gz
+    off = np.sqrt(off_x * off_x + off_y * off_y + off_z * off_z)
+    way = ONE / max(off, NEXT_TO_NOTHING)
+    return (
+        near + x * (far - near) + off * spacing,
+        off_x * way if off_x != 0 else (far - near) * nodes,
+        off_y * way if off_y != 0 else (left + x * (right - left)) * nodes,
+        off_z * way if off_z != 0 else (up_near + x * (up_far - up_near)) * nodes,
+    )
 
 
-@compiled
+@inlined
 def _in_nodes(
-    x: float, y: float, z: float, lower: Array, nodes: float
-) -> tuple[float, float, float]:
+    x: Single, y: Single, z: Single, lower: Floats, nodes: Single
+) -> tuple[Single, Single, Single]:
     """A point of a grid with so many nodes in each of its units, in nodes."""
     return (x - lower[0]) * nodes, (y - lower[1]) * nodes, (z - lower[2]) * nodes
 
@@ -109,10 +116,10 @@ def _in_nodes(
 def distances(values: Floats, lower: Array, spacing: float, points: Floats) -> Floats:
     """Distance (n,) at points (3, n)."""
     found = np.empty(points.shape[1], np.float32)
-    flat, nodes = values.ravel(), 1 / spacing
+    flat, low, nodes = values.ravel(), lower.astype(np.float32), np.float32(1 / spacing)
     for n in range(points.shape[1]):
-        x, y, z = _in_nodes(points[0, n], points[1, n], points[2, n], lower, nodes)
-        found[n] = _distance(flat, values.shape, spacing, x, y, z)
+        x, y, z = _in_nodes(points[0, n], points[1, n], points[2, n], low, nodes)
+        found[n] = _distance(flat, values.shape, np.float32(spacing), x, y, z)
     return found
 
 
@@ -123,11 +130,11 @@ def distances_and_gradients(
     """Distance (n,) and gradient (3, n) at points (3, n)."""
     found = np.empty(points.shape[1], np.float32)
     slope = np.empty(points.shape, np.float32)
-    flat, nodes = values.ravel(), 1 / spacing
+    flat, low, nodes = values.ravel(), lower.astype(np.float32), np.float32(1 / spacing)
     for n in range(points.shape[1]):
-        x, y, z = _in_nodes(points[0, n], points[1, n], points[2, n], lower, nodes)
+        x, y, z = _in_nodes(points[0, n], points[1, n], points[2, n], low, nodes)
         found[n], slope[0, n], slope[1, n], slope[2, n] = _look_up(
-            flat, values.shape, spacing, x, y, z
+            flat, values.shape, np.float32(spacing), x, y, z
         )
     return found, slope
 
@@ -163,7 +170,9 @@ def nearest_along(
             if z > end:
                 break
             x, y, w = grid[0, 3] + z * way[0], grid[1, 3] + z * way[1], grid[2, 3] + z * way[2]
-            off = _distance(flat, values.shape, spacing, x, y, w) * unit
+            off = unit * _distance(
+                flat, values.shape, np.float32(spacing), np.float32(x), np.float32(y), np.float32(w)
+            )
             if off < least[n]:
                 least[n], at[n] = off, z
             if off <= 0:
@@ -201,6 +210,8 @@ def explained(
     of one unit of the grid."""
     found = np.empty(len(T_model_cam))
     flat, nodes = values.ravel(), 1 / spacing
+    points = seen.T.astype(np.float32)
+    off = np.empty(len(seen), np.float32)
     for b in range(len(T_model_cam)):
         T = T_model_cam[b]
         a = T[:3, :3]
@@ -210,17 +221,38 @@ def explained(
             + a[0, 2] * (a[1, 0] * a[2, 1] - a[1, 1] * a[2, 0])
         )
         metres = unit / det ** (1 / 3)
-        grid = _to_nodes(T, lower, nodes, unit)
-        total = 0.0
-        for n in range(len(seen)):
-            x, y, z = _moved(grid, seen[n, 0], seen[n, 1], seen[n, 2])
-            off = abs(_distance(flat, values.shape, spacing, x, y, z)) * metres
+        grid = _to_nodes(T, lower, nodes, unit).astype(np.float32)
+        _far_off(flat, values.shape, np.float32(spacing), np.float32(metres), grid, points, off)
+        like, unlike = 0.0, 0.0
+        for n in range(len(off)):
             # See `geometry.bell`; beyond, it is next to nothing, and takes its time.
-            if off < 6 * near:
-                total += math.exp(-0.5 * (off / near) ** 2)
-            total -= distance * min(off / far, 1.0)
-        found[b] = total / len(seen)
+            if off[n] < 6 * near:
+                like += math.exp(-0.5 * (off[n] / near) ** 2)
+        for n in range(len(off)):
+            unlike += min(off[n], np.float32(far))
+        found[b] = (like - distance * unlike / far) / len(off)
     return found
+
+
+@compiled
+def _far_off(
+    flat: Floats,
+    shape: tuple[int, int, int],
+    spacing: Single,
+    unit: Single,
+    grid: Floats,
+    points: Floats,
+    off: Floats,
+) -> None:
+    """How far (n,) points (3, n) are from the surface, in place of `off`; grid : (3, 4), from
+    points to nodes; unit : metres of one unit of the grid."""
+    a, b, c = grid[0], grid[1], grid[2]
+    for n in range(len(off)):
+        p, q, r = points[0, n], points[1, n], points[2, n]
+        x = a[0] * p + a[1] * q + a[2] * r + a[3]
+        y = b[0] * p + b[1] * q + b[2] * r + b[3]
+        z = c[0] * p + c[1] * q + c[2] * r + c[3]
+        off[n] = abs(_distance(flat, shape, spacing, x, y, z)) * unit
 
 
 @compiled
@@ -231,51 +263,6 @@ def _to_nodes(T: Array, lower: Array, nodes: float, unit: float) -> Array:
     for axis in range(3):
         grid[axis, 3] -= lower[axis] * nodes
     return grid
-
-
-@compiled
-def contradicted(
-    T_cam_model: Array,
-    surface: Array,
-    depth: Floats,
-    K: Array,
-    normal: Array,
-    offset: float,
-    tolerance: float,
-    slope: float,
-) -> Array:
-    """See `Verifier.score`: of placements (B, 4, 4), the shares (B,) of surface points (m, 3) in
-    space that `depth` (H, W) shows to be free, and below the plane, together."""
-    height, width = depth.shape
-    found = np.empty(len(T_cam_model))
-    for b in range(len(T_cam_model)):
-        T = T_cam_model[b]
-        total = 0.0
-        for m in range(len(surface)):
-            x, y, z = _moved(T, surface[m, 0], surface[m, 1], surface[m, 2])
-            below = -(normal[0] * x + normal[1] * y + normal[2] * z + offset)
-            total += min(max((below - tolerance) / slope, 0.0), 1.0)
-            if z <= 0:
-                continue
-            away = 1 / z
-            u = np.rint(x * away * K[0, 0] + K[0, 2])
-            v = np.rint(y * away * K[1, 1] + K[1, 2])
-            if u >= 0 and u < width and v >= 0 and v < height:
-                gap = depth[int(v), int(u)] - z
-                # Where no depth is, nothing speaks against it.
-                if gap > tolerance:
-                    total += min((gap - tolerance) / slope, 1.0)
-        found[b] = total / len(surface)
-    return found
-
-
-@compiled
-def _moved(T: Array, x: float, y: float, z: float) -> tuple[float, float, float]:
-    return (
-        T[0, 0] * x + T[0, 1] * y + T[0, 2] * z + T[0, 3],
-        T[1, 0] * x + T[1, 1] * y + T[1, 2] * z + T[1, 3],
-        T[2, 0] * x + T[2, 1] * y + T[2, 2] * z + T[2, 3],
-    )
 
 
 @compiled
@@ -296,37 +283,26 @@ def refined(
     """See `refine_to_sdf`: placements (B, 4, 4) after the steps; unit : metres of one unit of the
     grid; unknowns : 6, or 7 with the size."""
     found = T_model_cam.copy()
-    flat, nodes = values.ravel(), 1 / spacing
-    inverse = 1 / unit
-    normal, fall = np.empty((unknowns, unknowns)), np.empty(unknowns)
-    row, step = np.empty(7), np.zeros(7)
+    flat, points = values.ravel(), np.ascontiguousarray(observed.T).astype(np.float32)
+    normal, fall, step = np.empty((7, 7)), np.empty(7), np.zeros(7)
+    own, grid = np.empty((3, 4), np.float32), np.empty((3, 4), np.float32)
+    scale = 1 / (spacing * unit)
     for b in range(len(found)):
         T = found[b]
         for _ in range(iterations):
-            normal[:], fall[:] = 0.0, 0.0
-            for n in range(len(observed)):
-                x, y, z = _moved(T, observed[n, 0], observed[n, 1], observed[n, 2])
-                at = _in_nodes(x * inverse, y * inverse, z * inverse, lower, nodes)
-                value, gx, gy, gz = _look_up(flat, values.shape, spacing, at[0], at[1], at[2])
-                value *= unit
-                if abs(value) >= reach:
-                    continue
-                row[0], row[1], row[2] = y * gz - z * gy, z * gx - x * gz, x * gy - y * gx
-                row[3], row[4], row[5] = gx, gy, gz
-                # Distances count in metres of the camera frame: in the model's, which shrink as it
-                # is taken to be larger, every noise would make it so.
-                row[6] = x * gx + y * gy + z * gz - value
-                for i in range(unknowns):
-                    fall[i] += row[i] * value
-                    for j in range(i + 1):
-                        normal[i, j] += row[i] * row[j]
+            for i in range(3):
+                for j in range(4):
+                    own[i, j] = T[i, j]
+                    grid[i, j] = T[i, j] * scale
+                grid[i, 3] = T[i, 3] * scale - lower[i] / spacing
+            _pull(flat, values.shape, spacing, unit, grid, own, points, reach, normal, fall)
             trace = 0.0
             for i in range(unknowns):
                 trace += normal[i, i]
             for i in range(unknowns):
                 # Nothing pulls where the trace is 0.
                 normal[i, i] += damping * trace / unknowns + (1.0 if trace == 0 else 0.0)
-            _solve(normal, fall)
+            _solve(normal, fall, unknowns)
             for i in range(unknowns):
                 step[i] = -fall[i]
             step[6] = min(max(step[6], -most_resized), most_resized)
@@ -340,11 +316,87 @@ def refined(
 
 
 @compiled
-def _solve(A: Array, b: Array) -> None:
+def _pull(
+    flat: Floats,
+    shape: tuple[int, int, int],
+    spacing: float,
+    unit: float,
+    grid: Floats,
+    T_model_cam: Floats,
+    points: Floats,
+    reach: float,
+    normal: Array,
+    fall: Array,
+) -> None:
+    """The normal equations of the points (3, n) within `reach` of the surface, in place: the lower
+    half of `normal` (7, 7), and `fall` (7,), for a turn, a shift, and a change of size.
+
+    grid : (3, 4), from points to nodes. Sums are numbers of their own, not in an array, since only
+    those are kept in registers.
+    """
+    wide, metres, most = np.float32(spacing), np.float32(unit), np.float32(reach)
+    px, py, pz = points[0], points[1], points[2]
+    a0, a1, a2, a3 = grid[0, 0], grid[0, 1], grid[0, 2], grid[0, 3]
+    b0, b1, b2, b3 = grid[1, 0], grid[1, 1], grid[1, 2], grid[1, 3]
+    c0, c1, c2, c3 = grid[2, 0], grid[2, 1], grid[2, 2], grid[2, 3]
+    T = T_model_cam
+    d0, d1, d2, d3 = T[0, 0], T[0, 1], T[0, 2], T[0, 3]
+    e0, e1, e2, e3 = T[1, 0], T[1, 1], T[1, 2], T[1, 3]
+    g0, g1, g2, g3 = T[2, 0], T[2, 1], T[2, 2], T[2, 3]
+    s00 = s10 = s11 = s20 = s21 = s22 = s30 = s31 = s32 = s33 = 0.0
+    s40 = s41 = s42 = s43 = s44 = s50 = s51 = s52 = s53 = s54 = s55 = 0.0
+    s60 = s61 = s62 = s63 = s64 = s65 = s66 = 0.0
+    f0 = f1 = f2 = f3 = f4 = f5 = f6 = 0.0
+    for n in range(points.shape[1]):
+        p, q, r = px[n], py[n], pz[n]
+        value, gx, gy, gz = _look_up(
+            flat,
+            shape,
+            wide,
+            a0 * p + a1 * q + a2 * r + a3,
+            b0 * p + b1 * q + b2 * r + b3,
+            c0 * p + c1 * q + c2 * r + c3,
+        )
+        value *= metres
+        pulls = ONE if abs(value) < most else ZERO
+        value, gx, gy, gz = value * pulls, gx * pulls, gy * pulls, gz * pulls
+        x = d0 * p + d1 * q + d2 * r + d3
+        y = e0 * p + e1 * q + e2 * r + e3
+        z = g0 * p + g1 * q + g2 * r + g3
+        v, r3, r4, r5 = np.float64(value), np.float64(gx), np.float64(gy), np.float64(gz)
+        r0, r1, r2 = y * r5 - z * r4, z * r3 - x * r5, x * r4 - y * r3
+        # Distances count in metres of the camera frame: in the model's, which shrink as it is
+        # taken to be larger, every noise would make it so.
+        r6 = x * r3 + y * r4 + z * r5 - v
+        s00, s10, s11 = s00 + r0 * r0, s10 + r1 * r0, s11 + r1 * r1
+        s20, s21, s22 = s20 + r2 * r0, s21 + r2 * r1, s22 + r2 * r2
+        s30, s31, s32, s33 = s30 + r3 * r0, s31 + r3 * r1, s32 + r3 * r2, s33 + r3 * r3
+        s40, s41, s42, s43 = s40 + r4 * r0, s41 + r4 * r1, s42 + r4 * r2, s43 + r4 * r3
+        s50, s51, s52, s53 = s50 + r5 * r0, s51 + r5 * r1, s52 + r5 * r2, s53 + r5 * r3
+        s44, s54, s55 = s44 + r4 * r4, s54 + r5 * r4, s55 + r5 * r5
+        s60, s61, s62, s63 = s60 + r6 * r0, s61 + r6 * r1, s62 + r6 * r2, s63 + r6 * r3
+        s64, s65, s66 = s64 + r6 * r4, s65 + r6 * r5, s66 + r6 * r6
+        f0, f1, f2, f3 = f0 + r0 * v, f1 + r1 * v, f2 + r2 * v, f3 + r3 * v
+        f4, f5, f6 = f4 + r4 * v, f5 + r5 * v, f6 + r6 * v
+    normal[0, 0] = s00
+    normal[1, 0], normal[1, 1] = s10, s11
+    normal[2, 0], normal[2, 1], normal[2, 2] = s20, s21, s22
+    normal[3, 0], normal[3, 1], normal[3, 2], normal[3, 3] = s30, s31, s32, s33
+    normal[4, 0], normal[4, 1], normal[4, 2], normal[4, 3] = s40, s41, s42, s43
+    normal[5, 0], normal[5, 1], normal[5, 2], normal[5, 3] = s50, s51, s52, s53
+    normal[6, 0], normal[6, 1], normal[6, 2], normal[6, 3] = s60, s61, s62, s63
+    normal[4, 4], normal[5, 4], normal[5, 5] = s44, s54, s55
+    normal[6, 4], normal[6, 5], normal[6, 6] = s64, s65, s66
+    fall[0], fall[1], fall[2], fall[3] = f0, f1, f2, f3
+    fall[4], fall[5], fall[6] = f4, f5, f6
+
+
+@compiled
+def _solve(A: Array, b: Array, n: int) -> None:
     """b (n,) becomes the solution of A x = b, in place; A (n, n) is positive definite, and only its
     lower half is read, which becomes its Cholesky factor. LAPACK's takes longer to be compiled in
     than all of this file."""
-    for i in range(len(b)):
+    for i in range(n):
         for j in range(i + 1):
             rest = A[i, j]
             for k in range(j):
@@ -353,8 +405,8 @@ def _solve(A: Array, b: Array) -> None:
         for j in range(i):
             b[i] -= A[i, j] * b[j]
         b[i] /= A[i, i]
-    for i in range(len(b) - 1, -1, -1):
-        for j in range(i + 1, len(b)):
+    for i in range(n - 1, -1, -1):
+        for j in range(i + 1, n):
             b[i] -= A[j, i] * b[j]
         b[i] /= A[i, i]
 

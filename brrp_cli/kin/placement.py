@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from brrp_cli.kin.coarse_loops import HALVES, coarse_distances
 from brrp_cli.kin.library import Library
 
 Floats = NDArray[np.float32]
@@ -74,21 +75,20 @@ def joined(each: list[Placements]) -> Placements:
 
 def coarse_distance(placements: Placements, points: Floats, library: Library) -> Floats:
     """Distance (B, n), metres, of points (n, 3), frame of the plane, from the coarse fields."""
-    nodes = round(library.coarse.shape[1] ** (1 / 3))
-    u = placements.to_box(points)
-    step = (nodes - 1) / (2 * library.reach)
-    cell = np.clip(np.rint((u + library.reach) * step), 0, nodes - 1).astype(np.int64)
-    number = (cell[0] * nodes + cell[1]) * nodes + cell[2]
-    number += placements.stance[:, None] * nodes**3
-    # Rows of eight bytes: one look-up for each point.
-    found = library.coarse.reshape(-1, 4).view(np.uint64).ravel().take(number)
-    value = found.view(np.float16).reshape(*number.shape, 4).astype(np.float32)
     ratio = (library.half[placements.stance] / placements.half) ** 2
-    steepness = np.einsum("bnc,bc->bn", value[..., 1:], ratio)
-    distance = value[..., 0] / np.sqrt(np.maximum(steepness, 1e-6))
-    # Off the grid, the way to it on top.
-    over = np.maximum(np.abs(u) - library.reach, 0) * placements.half.T[:, :, None]
-    return np.asarray(distance + np.sqrt(np.square(over).sum(axis=0)))
+    return coarse_distances(
+        placements.stance,
+        placements.turn,
+        placements.middle,
+        placements.half,
+        placements.taper,
+        ratio,
+        points,
+        library.coarse.view(np.uint16),
+        HALVES,
+        round(library.coarse.shape[1] ** (1 / 3)),
+        library.reach,
+    )
 
 
 def distance_and_slopes(

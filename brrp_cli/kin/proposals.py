@@ -18,7 +18,7 @@ CHUNK = 512
 
 
 def proposals(evidence: Evidence, library: Library, config: KinConfig) -> Placements:
-    """All that are no larger, smaller or more stretched than is plausible."""
+    """All that are no larger, smaller or more stretched than is plausible, stance after stance."""
     seen, size = evidence.seen, library.half
     top = max(float(np.quantile(seen[:, 2], config.most[1])), 2 * config.least_half)
     stances, found = np.arange(len(size)), []
@@ -55,7 +55,9 @@ def proposals(evidence: Evidence, library: Library, config: KinConfig) -> Placem
     plausible = (np.abs(mean) < config.most_size) & (
         np.abs(log - mean[:, None]).max(axis=1) < config.most_stretch
     )
-    return every[np.flatnonzero(plausible)]
+    rows = np.flatnonzero(plausible)
+    # A stance's field is in the cache while all of its proposals are judged.
+    return every[rows[np.argsort(every.stance[rows], kind="stable")]]
 
 
 def starts(evidence: Evidence, library: Library, config: KinConfig) -> Placements:

@@ -14,7 +14,7 @@ from brrp_cli.registration.model import Model, ModelGeometry
 from brrp_cli.registration.outline import Footprint
 from brrp_cli.registration.ransac import match_pairs
 from brrp_cli.registration.scale_scan import ObservedCloud
-from brrp_cli.registration.side_loops import lay_over
+from brrp_cli.registration.side_loops import lay_over, with_ends
 from brrp_cli.seeds import child_rng
 
 Array = NDArray[np.float64]
@@ -47,13 +47,8 @@ def resting_initial_poses(
         config.least_facing,
     )
     more = reach - footprint.extent(directions)
-    longer = np.flatnonzero(more > config.hidden)
-    way = more[longer, None] / 2 * directions[longer]
-    ends = np.concatenate([T[longer], T[longer]])
-    ends[:, :2, 3] += np.concatenate([way, -way])
-    # Each is followed by itself over either end.
-    order = np.argsort(np.concatenate([np.arange(len(T)), longer, longer]), kind="stable")
-    return np.asarray(np.linalg.inv(footprint.T_plane_cam) @ np.concatenate([T, ends])[order])
+    T = with_ends(T, more, directions, config.hidden)
+    return np.asarray(np.linalg.inv(footprint.T_plane_cam) @ T)
 
 
 def feature_matched_poses(

@@ -15,7 +15,7 @@ from brrp_cli.geometry import as_transforms
 from brrp_cli.registration.initial_poses import resting_initial_poses
 from brrp_cli.registration.model import ModelGeometry
 from brrp_cli.registration.outline import Footprint, Outline, principal_axes
-from brrp_cli.registration.side_loops import facing_boxes
+from brrp_cli.registration.side_loops import facing_boxes, tops
 
 Array = NDArray[np.float64]
 
@@ -47,12 +47,12 @@ def raised_poses(
     """Those of the resting poses T_cam_model (B, 4, 4) whose top is lower than that of what is seen
     by more than `hidden`, raised to it: an object that lies on others."""
     plane = footprint.plane
-    up = plane.normal @ resting[:, :3, :3]
-    reached = (up @ model.surface.T).max(axis=1)
-    missing = footprint.top - reached - plane.signed_distance(resting[:, :3, 3])
-    raised = resting.copy()
-    raised[:, :3, 3] += missing[:, None] * plane.normal
-    return raised[missing > config.hidden]
+    reached = tops(resting, model.surface, plane.normal) + plane.offset
+    missing = footprint.top - reached
+    lower = missing > config.hidden
+    raised = np.asarray(resting[lower])
+    raised[:, :3, 3] += missing[lower, None] * plane.normal
+    return raised
 
 
 def principal_poses(model: ModelGeometry, seen: Outline) -> Array:

@@ -74,6 +74,42 @@ def lay_over(
 
 
 @compiled
+def with_ends(T: Array, more: Array, directions: Array, hidden: float) -> Array:
+    """Transforms (B, 4, 4), and after each whose model reaches further than what is seen by `more`
+    (B,) than `hidden`, two that are slid in `directions` (B, 2) so that either end is the seen
+    one's."""
+    found = np.empty((len(T) + 2 * np.sum(more > hidden), 4, 4))
+    n = 0
+    for b in range(len(T)):
+        found[n] = T[b]
+        n += 1
+        if more[b] > hidden:
+            for sense in (1, -1):
+                found[n] = T[b]
+                for axis in range(2):
+                    found[n, axis, 3] += sense * more[b] / 2 * directions[b, axis]
+                n += 1
+    return found
+
+
+@compiled
+def tops(T: Array, surface: Array, normal: Array) -> Array:
+    """How far (B,) a surface (m, 3), placed in each way (B, 4, 4), reaches along a direction."""
+    found = np.empty(len(T))
+    x, y, z = surface[:, 0].copy(), surface[:, 1].copy(), surface[:, 2].copy()
+    for b in range(len(T)):
+        along = np.zeros(4)
+        for i in range(3):
+            along += normal[i] * T[b, i]
+        a, c, d = along[0], along[1], along[2]
+        most = -np.inf
+        for m in range(len(surface)):
+            most = max(most, a * x[m] + c * y[m] + d * z[m])
+        found[b] = most + along[3]
+    return found
+
+
+@compiled
 def _center(T: Array, surface: Array, counts: NDArray[np.bool_], middle: Array) -> None:
     low, high = _reach(T, surface, counts, 1.0, 0.0)
     T[0, 3] += middle[0] - (low + high) / 2

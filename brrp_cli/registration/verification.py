@@ -8,9 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brrp_cli.config import SearchConfig, VerificationConfig
-from brrp_cli.distance_loops import contradicted, explained
+from brrp_cli.distance_loops import explained
 from brrp_cli.frames.frame import Frame
 from brrp_cli.observation.support_plane import Plane
+from brrp_cli.registration.free_space_loops import contradicted
 from brrp_cli.registration.model import ModelGeometry
 from brrp_cli.registration.outline import Outline, outline
 from brrp_cli.registration.transform_loops import inverses
