@@ -170,8 +170,10 @@ class SearchConfig:
 
     Initial poses are `matchings` feature matchings, every resting pose turned `turns` times and
     raised to the top of what is seen, and the model in `rotations` evenly spread turns and along
-    the principal axes of what is seen. The best `begun` of them are brought nearer in
-    `begun_steps` steps with `begun_points` observed points; the best `coarse` of those are refined
+    the principal axes of what is seen. The best `begun` of them, and no more than the part `sifted`
+    of them, by one of `sifting_share` points, are brought nearer in `begun_steps` steps with
+    `begun_points` observed points; the best `coarse` of those, by one of `first_share` points, are
+    refined
     `coarse_steps` steps with `coarse_points`, which reach the surface from `coarse_distance`; the
     best `middle` of those, and then the best `fine`, are refined again, each with more points,
     without those within `same_turn` radians and `same_shift` metres of a better one. A stored
@@ -201,6 +203,8 @@ class SearchConfig:
         default_factory=lambda: RegistrationConfig(iterations=5_000)
     )
     begun: int = 400
+    sifted: float = share(1.0)
+    sifting_share: int = 3
     begun_points: int = 20
     begun_steps: int = 3
     coarse: int = 48

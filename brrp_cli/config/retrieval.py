@@ -95,16 +95,18 @@ class AlignmentConfig:
 
     from_objects : size of the prior from which on they are. Fewer objects are told apart without
         it, `likeness` in place of `fusion`, and real depth lowers the scores of the right one too
-    tried : objects that are laid over what is seen in a first round, so many of those with colours
-        and of those without, the most probable by their likenesses; margin : nats by which their
-        likeness may be less than the best one's; glanced : objects of each kind in each of the
-        rounds after it, the most probable after a glance at all; first : weight, in nats, of the
-        score that they reach at a glance, or in the first few steps
+    tried : objects that are laid over what is seen in each of the first rounds, so many of those
+        with colours and of those without, the most probable by their likenesses; margin : nats by
+        which their likeness may be less than the best one's
+    glanced : share of either, the most probable after a glance at all, in each of the rounds after
+        those, and least : so many at least; first : weight, in nats, of the score that they reach
+        at a glance, or in the first few steps
     most : objects whose placements are refined, the best by likenesses and first score; where none
         of them is `certain`, so are the next `more`
     certain : nats that alignment, silhouette, point pairs and size may say against an object that
-        is right for all that, and distinct : its share among those that were tried, at least; the
-        rounds end with such a one, or where none of those left could become the most probable
+        is right for all that, and at_once : in the first round, before much was tried beside it;
+        distinct : its share among those that were tried, at least. The rounds end with such a one,
+        or where none of those left could become the most probable
     last : objects that are refined once more in the end, the best by likeness and score; the more
         points, the better shapes that are nearly alike are told apart
     least_points : of the object that have to be seen
@@ -121,9 +123,11 @@ class AlignmentConfig:
     """
 
     from_objects: int = 100
-    tried: int = 24
-    glanced: tuple[int, ...] = (64, 80)
+    tried: tuple[int, ...] = (8, 16)
+    glanced: tuple[float, ...] = (0.08, 0.1)
+    least: int = 8
     certain: float = between(5.5, 0.0, 1000.0)
+    at_once: float = between(4.0, 0.0, 1000.0)
     distinct: float = share(0.5)
     margin: float = 12.0
     first: float = 30.0
@@ -143,6 +147,8 @@ class AlignmentConfig:
             seen_points=100,
             first_share=2,
             begun=1_000,
+            sifted=0.34,
+            sifting_share=10,
             begun_steps=2,
             coarse=24,
             coarse_points=60,
@@ -161,7 +167,11 @@ class AlignmentConfig:
             model_points=100,
             seen_points=100,
             first_share=2,
+            begun=10_000,
+            sifted=0.34,
+            sifting_share=10,
             begun_steps=3,
+            coarse=1,
         )
     )
     finest: SearchConfig = field(

@@ -7,6 +7,8 @@ after a few steps with few points, which cost little more than the scores.
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -23,10 +25,11 @@ def best_brought_nearer(
     T_cam_model: Array, model: ModelGeometry, verifier: Verifier, config: SearchConfig
 ) -> tuple[Array, Array]:
     """The `coarse` best of placements (B, 4, 4) after `begun_steps` steps with `begun_points`
-    observed points, best first, and their scores. Of more than `begun` only the best begin."""
-    T = T_cam_model
-    if len(T) > config.begun:
-        T, _ = best_of(T, model, verifier, config, config.begun, config.first_share)
+    observed points, best first, and their scores. Of more than `begun`, or `sifted` of them, only
+    the best begin."""
+    T, count = T_cam_model, min(config.begun, math.ceil(config.sifted * len(T_cam_model)))
+    if len(T) > count:
+        T, _ = best_of(T, model, verifier, config, count, config.sifting_share)
     T = brought_nearer(
         T,
         model,

@@ -13,23 +13,17 @@ import numpy as np
 
 from brrp_cli.config import SearchConfig
 from brrp_cli.prior.distance_field import DistanceField
-from brrp_cli.registration.begin import best_of, brought_nearer, coarse_score
+from brrp_cli.registration.begin import best_brought_nearer
 from brrp_cli.registration.leaning_poses import resting_and_leaning
 from brrp_cli.registration.model import BareModel
 from brrp_cli.registration.verification import Verifier
-
-# One of so many placements is brought nearer, the best by one of so many points.
-KEPT, POINTS = 3, 10
 
 
 def glance(model: BareModel, verifier: Verifier, config: SearchConfig) -> float:
     """The best coarse alignment score of the first placements after `begun_steps` steps."""
     T = resting_and_leaning(model, verifier.outline(config), config)
-    T, _ = best_of(T, model, verifier, config, max(len(T) // KEPT, 1), POINTS)
-    T = brought_nearer(
-        T, model, verifier, config.begun_points, config.coarse_distance, config.begun_steps
-    )
-    return float(coarse_score(T, model, verifier, config, config.first_share).max())
+    _, scores = best_brought_nearer(T, model, verifier, config)
+    return float(scores[0])
 
 
 def coarser(model: BareModel, points: int) -> BareModel:

@@ -3,7 +3,8 @@ glance at all of them finds, until one is found."""
 
 from __future__ import annotations
 
-from itertools import pairwise
+import math
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +12,6 @@ from numpy.typing import NDArray
 from brrp_cli.config.retrieval import RetrievalConfig
 from brrp_cli.retrieval.placed_objects import PlacedObjects
 from brrp_cli.retrieval.score_fusion import Similarity, by_shape, looks_difference
-from brrp_cli.retrieval.shortlist import kinds
 
 Rows = NDArray[np.int64]
 Nats = NDArray[np.float64]
@@ -48,15 +48,16 @@ class Rounds:
         self._counted = looks + looks_difference(look, config.likeness, config.fusion)
         self._shape = by_shape(look, config.likeness)
         self._sure = look.points / (look.points + config.fusion.points)
+        self._certain = config.alignment.at_once
 
     def run(self, hasty: bool) -> None:
-        """All rounds; in haste, the first. Then the best are placed once more."""
+        """All rounds; in haste, those before the glance. Then the best are placed once more."""
         own = self._config.alignment
-        if not self._ends(self._of_each_kind(self._left, 0, own.tried)) and not hasty:
-            ranked = self._at_a_glance()
-            for begin, end in pairwise([0, *np.cumsum(own.glanced).tolist()]):
-                if self._ends(self._of_each_kind(ranked, begin, end)):
-                    break
+        if not self._rounds_end(self._left, lambda count: own.tried) and not hasty:
+            self._rounds_end(
+                self._at_a_glance(),
+                lambda count: [max(math.ceil(share * count), own.least) for share in own.glanced],
+            )
         promise = self._counted + own.first * self._placed.agreed
         promise[self._placed.alignment <= own.lowest] = -np.inf
         last = np.argsort(-promise, kind="stable")[: own.last]
@@ -68,13 +69,26 @@ class Rounds:
         promise = self._counted[left] + self._config.alignment.first * self._placed.glances(left)
         return left[np.argsort(-promise, kind="stable")]
 
-    def _of_each_kind(self, ranked: Rows, begin: int, end: int) -> Rows:
-        """With and without colours, from one to another of each. In the prior's order, in which
-        shards hold them."""
-        chosen = [ranked[kind[begin:end]] for kind in kinds(self._plain[ranked])]
-        return np.sort(np.concatenate([np.zeros(0, np.int64), *chosen]))
+    def _rounds_end(self, ranked: Rows, sizes: Callable[[int], Sequence[int]]) -> bool:
+        """Rounds of the first of the ranked ones, of those after them, and so on; whether they end
+        before all of those are tried.
 
-    def _ends(self, rows: Rows) -> bool:
+        sizes : of the rounds, in objects of those with colours, of which there are so many, and of
+            those without
+        """
+        by_kind = []
+        for plain in (False, True):
+            ends = np.cumsum(np.array(sizes(int(np.sum(self._plain == plain))), np.int64))
+            of_kind = ranked[self._plain[ranked] == plain]
+            by_kind.append(np.split(of_kind, ends)[:-1])
+        for rows in zip(*by_kind, strict=True):
+            # In the prior's order, in which shards hold them.
+            if self._round_ends(np.sort(np.concatenate(rows))):
+                return True
+            self._certain = self._config.alignment.certain
+        return False
+
+    def _round_ends(self, rows: Rows) -> bool:
         """Try some (r,); whether the rounds end with them."""
         own, placed = self._config.alignment, self._placed
         self._left = self._left[~np.isin(self._left, rows)]
@@ -96,7 +110,7 @@ class Rounds:
         total = self._agreed(self._sure)
         best = int(total.argmax())
         unlike = weight * (1 - self._placed.agreed[best]) - self._shape[best]
-        return bool(unlike <= own.certain and softmax(total)[best] >= own.distinct)
+        return bool(unlike <= self._certain and softmax(total)[best] >= own.distinct)
 
     def _agreed(self, sure: float = 1.0) -> Nats:
         return self._counted + sure * self._config.fusion.alignment * self._placed.agreed

@@ -21,7 +21,15 @@ from brrp_cli.retrieval.base import hasty, helped, one_image, sendable, unknown
 PLACES = {3: (-0.15, 0.1), 4: (0.12, 0.14), 8: (0.0, -0.02), 9: (0.2, -0.1), 11: (-0.2, -0.14)}
 STRANGER = 20
 # Rounds of one object each, none of which ends them.
-ONE_BY_ONE = {"tried": 1, "glanced": (1,) * 4, "margin": 100.0, "unaligned": 0.1, "certain": 0.0}
+ONE_BY_ONE = {
+    "tried": (1,),
+    "glanced": (0.0,) * 4,
+    "least": 1,
+    "margin": 100.0,
+    "unaligned": 0.1,
+    "certain": 0.0,
+    "at_once": 0.0,
+}
 
 
 @pytest.fixture(scope="module")
@@ -237,11 +245,11 @@ def test_more_objects_are_tried_until_one_lies_well(prior):
         found = aligner.evidence(frame)
         return {i: int((found[i].alignment > 0.1).sum()) for i in (*names, STRANGER)}
 
-    assert set(aligned(tried=1, glanced=()).values()) == {1}
+    assert set(aligned(tried=(1,), glanced=()).values()) == {1}
     # The stranger lies well on nothing, so that all are tried; the others end with their own.
-    until = aligned(tried=1, glanced=(1,) * 4, certain=6.0)
+    until = aligned(tried=(1,), least=1, glanced=(0.0,) * 4, certain=6.0, at_once=6.0)
     assert until[STRANGER] > max(until[i] for i in names) == 1
-    assert min(aligned(tried=2, glanced=(), certain=0.0).values()) > 1
+    assert min(aligned(tried=(2,), glanced=(), certain=0.0, at_once=0.0).values()) > 1
 
 
 def test_rounds_end_where_none_of_those_left_could_become_the_most_probable(prior):
@@ -280,7 +288,13 @@ def test_what_looks_do_not_find_a_glance_finds(prior):
 
     def found(**numbers):
         alignment = dataclasses.replace(
-            own.alignment, from_objects=1, tried=1, certain=0.0, **numbers
+            own.alignment,
+            from_objects=1,
+            tried=(1,),
+            least=1,
+            certain=0.0,
+            at_once=0.0,
+            **numbers,
         )
         retrieval = dataclasses.replace(
             own,
@@ -293,7 +307,7 @@ def test_what_looks_do_not_find_a_glance_finds(prior):
         boxes = {"red_box", "blue_box"}
         return {i for i, name in best.items() if name == names[i] or {name, names[i]} == boxes}
 
-    assert found(glanced=(1,)) == set(names) > found(glanced=())
+    assert found(glanced=(0.0,)) == set(names) > found(glanced=())
 
 
 @pytest.mark.parametrize("kept", [0.0, 0.2])
