@@ -45,7 +45,7 @@ PARTS = (
 # beside it.
 Shares = NDArray[np.floating]
 Against = Callable[[Shares, Shares], Shares]
-# Models that are held in memory, 0.2 MB each; and coarser ones, 0.03 MB each.
+# Models that are held in memory, 0.14 MB each; and coarser ones, 0.03 MB each.
 HELD, HELD_COARSELY = 1024, 4096
 
 
@@ -91,29 +91,46 @@ class Aligner:
 
     def models(self, names: Sequence[str]) -> list[BareModel]:
         """The models of objects of these names. Errors: PriorError."""
-        return self._kept(names, self._held, HELD, lambda model: model)
+        self._read([name for name in names if name not in self._held])
+        found = [self._held[name] for name in names]
+        for name in names:
+            self._held.move_to_end(name)
+        _let_go(self._held, HELD)
+        return [_with_values(model, np.float32) for model in found]
 
     def coarse_models(self, names: Sequence[str]) -> list[BareModel]:
         """The same, as `glance` needs them. Errors: PriorError."""
         points = self._config.glance.model_points
-        return self._kept(names, self._coarse, HELD_COARSELY, lambda each: coarser(each, points))
-
-    def _kept(
-        self,
-        names: Sequence[str],
-        held: OrderedDict[str, BareModel],
-        most: int,
-        made: Callable[[BareModel], BareModel],
-    ) -> list[BareModel]:
-        new = [name for name in names if name not in held]
-        for name, arrays in self._prior.parts(new, PARTS):
-            held[name] = made(bare_model(arrays, self._config.search.fine_points))
+        new = [name for name in names if name not in self._coarse]
+        for start in range(0, len(new), HELD):
+            some = new[start : start + HELD]
+            self._coarse |= {
+                name: coarser(model, points)
+                for name, model in zip(some, self.models(some), strict=True)
+            }
+        found = [self._coarse[name] for name in names]
         for name in names:
-            held.move_to_end(name)
-        models = [held[name] for name in names]
-        while len(held) > most:
-            held.popitem(last=False)
-        return models
+            self._coarse.move_to_end(name)
+        _let_go(self._coarse, HELD_COARSELY)
+        return found
+
+    def _read(self, names: Sequence[str]) -> None:
+        for name, arrays in self._prior.parts(names, PARTS):
+            model = bare_model(arrays, self._config.search.fine_points)
+            self._held[name] = _with_values(model, np.float16)
+
+
+def _let_go(held: OrderedDict[str, BareModel], most: int) -> None:
+    """Of what was not used for longest, until so many are left."""
+    while len(held) > most:
+        held.popitem(last=False)
+
+
+def _with_values(model: BareModel, kind: type[np.floating]) -> BareModel:
+    """With distances in another precision: they are kept in the one in which they are stored, half
+    the memory of that in which they are computed with."""
+    field = model.field
+    return replace(model, field=replace(field, values=field.values.astype(kind)))
 
 
 def tolerant(score: VerificationConfig, deviation: float) -> VerificationConfig:
