@@ -147,7 +147,7 @@ class AlignmentConfig:
             seen_points=100,
             first_share=2,
             begun=1_000,
-            sifted=0.34,
+            sifted=0.5,
             sifting_share=10,
             begun_steps=2,
             coarse=24,
