@@ -16,6 +16,7 @@ from brrp_cli.distance_loops import nearest_along
 from brrp_cli.frames.dilate import dilated, mask_box
 from brrp_cli.frames.frame import BACKGROUND, Frame
 from brrp_cli.registration.model import ModelGeometry
+from brrp_cli.registration.transform_loops import inverses
 
 Array = NDArray[np.float64]
 
@@ -71,7 +72,7 @@ def bare_and_spilled(
 
     tolerance : metres by which measured depth errs
     """
-    T_model_cam = np.ascontiguousarray(np.linalg.inv(T_cam_model), dtype=np.float64)
+    T_model_cam = inverses(np.ascontiguousarray(T_cam_model, dtype=np.float64)[None])[0]
     field, unit = model.field, model.half_extent
     grid = field.values, field.lower, field.spacing, unit, T_model_cam
     off, _ = nearest_along(*grid, seen.own)

@@ -15,7 +15,7 @@ from brrp_cli.geometry import transform_points
 from brrp_cli.kin.evidence import gather
 from brrp_cli.kin.fit import fit_kin
 from brrp_cli.kin.kept_library import kin_library
-from brrp_cli.kin.placement import Placements, distance_and_slopes
+from brrp_cli.kin.placement import Placements, coarse_distance, distance_and_slopes
 from brrp_cli.kin.refine import refined
 from brrp_cli.kin.stretched import unbent_shape
 from brrp_cli.methods.kin_hypotheses import kin_shares
@@ -155,6 +155,35 @@ def test_distances_and_slopes_are_those_of_the_stretched_mesh(prior, taper):
         moved = near + step * np.eye(3)[axis]
         quotient = (shape.signed_distance(moved, 0.05) - exact) / step
         assert np.median(np.abs(quotient - across[axis, 0])) < 0.12
+
+
+@pytest.mark.parametrize("taper", [0.0, 0.2])
+def test_coarse_distances_are_right_to_half_a_node_and_grow_off_the_grid(prior, taper):
+    library = kin_library(prior, KIN)
+    stances = np.arange(len(library.object))
+    rng = np.random.default_rng(0)
+    half = (library.half * rng.uniform(0.8, 1.25, (len(stances), 3))).astype(np.float32)
+    at = Placements(
+        stances,
+        rng.uniform(0, 2 * np.pi, len(stances)).astype(np.float32),
+        rng.normal(0, 0.02, (len(stances), 3)).astype(np.float32),
+        half,
+        np.full(len(stances), taper, np.float32),
+    )
+    within = at.placed(library.surface[:, :50])
+    node = 2 * library.reach / (KIN.nodes - 1) * half.max(axis=1)
+    for row in range(len(stances)):
+        one = at[np.array([row])]
+        points = np.ascontiguousarray(within[:, row].T)
+        coarse, exact = (
+            coarse_distance(one, points, library),
+            distance_and_slopes(one, points, library),
+        )
+        assert np.abs(coarse - exact[0]).mean() < node[row] / 2
+        away = points[:1] + np.array([[0.0, 0.0, 1.0]], np.float32)
+        further = away + np.array([[0.0, 0.0, 0.5]], np.float32)
+        nearer, off = (coarse_distance(one, some, library)[0, 0] for some in (away, further))
+        assert off - nearer == pytest.approx(0.5, abs=0.01)
 
 
 def test_a_library_is_the_same_whoever_asks(prior):

@@ -252,6 +252,23 @@ def test_more_objects_are_tried_until_one_lies_well(prior):
     assert min(aligned(tried=(2,), glanced=(), certain=0.0, at_once=0.0).values()) > 1
 
 
+def test_after_a_glance_a_share_of_the_prior_is_tried(prior):
+    """Of those with colours and of those without; never fewer than `least` of either."""
+    frame, names = scene()
+
+    def tried(share, least):
+        numbers = ONE_BY_ONE | {"glanced": (share,), "least": least, "distinct": 1.0}
+        found = retriever_of(prior, True, worth=10_000.0, **numbers).evidence(frame)
+        return max(int((found[i].alignment > 0.1).sum()) for i in names)
+
+    plain = int(np.sum(~prior.appearance.first.colour.any(axis=1)))
+    first = (plain > 0) + 1
+    count = len(prior.names)
+    assert tried(0.0, 1) == 2 * first
+    assert tried(1.0, 1) == count
+    assert tried(0.0, count) == count
+
+
 def test_rounds_end_where_none_of_those_left_could_become_the_most_probable(prior):
     frame, names = scene()
 
