@@ -99,7 +99,8 @@ class AlignmentConfig:
         with colours and of those without, the most probable by their likenesses; margin : nats by
         which their likeness may be less than the best one's
     glanced : share of either, the most probable after a glance at all, in each of the rounds after
-        those, and least : so many at least; first : weight, in nats, of the score that they reach
+        those, and least : so many at least; blindly : the shares where depth shows too little for
+        a glance to tell much (see `blind`); first : weight, in nats, of the score that they reach
         at a glance, or in the first few steps
     most : objects whose placements are refined, the best by likenesses and first score; where none
         of them is `certain`, so are the next `more`
@@ -125,6 +126,7 @@ class AlignmentConfig:
     from_objects: int = 100
     tried: tuple[int, ...] = (8, 16)
     glanced: tuple[float, ...] = (0.08, 0.1)
+    blindly: tuple[float, ...] = (0.25, 0.3)
     least: int = 8
     certain: float = between(5.5, 0.0, 1000.0)
     at_once: float = between(4.0, 0.0, 1000.0)
@@ -148,7 +150,7 @@ class AlignmentConfig:
             first_share=2,
             begun=1_000,
             sifted=0.5,
-            sifting_share=10,
+            sifting_share=5,
             begun_steps=2,
             coarse=24,
             coarse_points=60,

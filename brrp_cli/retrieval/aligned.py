@@ -175,6 +175,11 @@ class SeenPart:
         self._first: dict[str, Aligned] = {}
         self._placed: dict[str, Aligned] = {}
 
+    @property
+    def blind(self) -> bool:
+        """Of the mask: see `Mask`."""
+        return self._mask.blind
+
     def glances(self, names: Sequence[str]) -> NDArray[np.float64]:
         """Scores (m,) of the objects of these names at a glance. Errors: PriorError."""
         models = self._aligner.coarse_models(names)

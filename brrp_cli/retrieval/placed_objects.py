@@ -31,6 +31,11 @@ class PlacedObjects:
         self.agreed = self.alignment.copy()
         self.bare, self.spilled = np.zeros((2, len(names)), np.float32)
 
+    @property
+    def blind(self) -> bool:
+        """Whether depth shows too little of the object to tell alone how others lie over it."""
+        return self._seen.blind
+
     def glances(self, rows: Rows) -> NDArray[np.float64]:
         """Scores (r,) of some of them at a glance. Errors: PriorError."""
         return self._seen.glances(self._of(rows))

@@ -54,9 +54,10 @@ class Rounds:
         """All rounds; in haste, those before the glance. Then the best are placed once more."""
         own = self._config.alignment
         if not self._rounds_end(self._left, lambda count: own.tried) and not hasty:
+            shares = own.blindly if self._placed.blind else own.glanced
             self._rounds_end(
                 self._at_a_glance(),
-                lambda count: [max(math.ceil(share * count), own.least) for share in own.glanced],
+                lambda count: [max(math.ceil(share * count), own.least) for share in shares],
             )
         promise = self._counted + own.first * self._placed.agreed
         promise[self._placed.alignment <= own.lowest] = -np.inf
