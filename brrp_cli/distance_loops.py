@@ -23,7 +23,7 @@ Floats = NDArray[np.float32]
 Single = Any
 
 ZERO, ONE = np.float32(0), np.float32(1)
-# What a divisor is at least, where 0 would do no harm but for the warning.
+# What a divisor is at least: what is divided by less is not used.
 NEXT_TO_NOTHING = np.float32(1e-20)
 # What rounding leaves of a positive number that is next to nothing.
 TINY = 1e-30

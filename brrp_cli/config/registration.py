@@ -173,21 +173,19 @@ class SearchConfig:
     the principal axes of what is seen. The best `begun` of them, and no more than the part `sifted`
     of them, by one of `sifting_share` points, are brought nearer in `begun_steps` steps with
     `begun_points` observed points; the best `coarse` of those, by one of `first_share` points, are
-    refined
-    `coarse_steps` steps with `coarse_points`, which reach the surface from `coarse_distance`; the
-    best `middle` of those, and then the best `fine`, are refined again, each with more points,
-    without those within `same_turn` radians and `same_shift` metres of a better one. A stored
-    object has its stored size. That it is something of the kind, of another size, is a hypothesis
-    of its own, with a size that is refined with the pose: the best `rescaled` placements begin it
-    at `sizes` times the true size, observed points pull from `size_distance` metres, and sizes
-    whose logarithm is within `least_size_change` of 0 or beyond `most_size` are dropped. Its
-    alignment score falls by size_cost + size_spread_cost * ln(size)^2. No other size is tried where
-    the score reaches `settled`, and nothing is refined further where none of the placements reaches
-    `unpromising` after the first steps, or `hopeless` later, or all stay `beaten` behind another
-    model's. Of placements whose surfaces lie within
-    `distinct` metres the best is kept, `kept` in all. An object is not placed at all where another
-    one, with a score of `explained`, explains what is seen, and P(c|R) is less than a share
-    `unlikely` of that one's.
+    refined `coarse_steps` steps with `coarse_points`, which reach the surface from
+    `coarse_distance`; the best `middle` of those, and then the best `fine`, are refined again, each
+    with more points, without those within `same_turn` radians and `same_shift` metres of a better
+    one. A stored object has its stored size. That it is something of the kind, of another size, is
+    a hypothesis of its own, with a size that is refined with the pose: the best `rescaled`
+    placements begin it at `sizes` times the true size, observed points pull from `size_distance`
+    metres, and sizes whose logarithm is within `least_size_change` of 0 or beyond `most_size` are
+    dropped. Its alignment score falls by size_cost + size_spread_cost * ln(size)^2. No other size
+    is tried where the score reaches `settled`, and nothing is refined further where none of the
+    placements reaches `unpromising` after the first steps, or `hopeless` later, or all stay
+    `beaten` behind another model's. Of placements whose surfaces lie within `distinct` metres the
+    best is kept, `kept` in all. An object is not placed at all where another one, with a score of
+    `explained`, explains what is seen, and P(c|R) is less than a share `unlikely` of that one's.
     """
 
     turns: int = 24
