@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from brrp_cli.compiled import compiled, inlined
+from brrp_cli.compiled import compiled_freely, inlined
 
 Array = NDArray[np.float64]
 Floats = NDArray[np.float32]
@@ -112,7 +112,7 @@ def _in_nodes(
     return (x - lower[0]) * nodes, (y - lower[1]) * nodes, (z - lower[2]) * nodes
 
 
-@compiled
+@compiled_freely
 def distances(values: Floats, lower: Array, spacing: float, points: Floats) -> Floats:
     """Distance (n,) at points (3, n)."""
     found = np.empty(points.shape[1], np.float32)
@@ -123,7 +123,7 @@ def distances(values: Floats, lower: Array, spacing: float, points: Floats) -> F
     return found
 
 
-@compiled
+@compiled_freely
 def distances_and_gradients(
     values: Floats, lower: Array, spacing: float, points: Floats
 ) -> tuple[Floats, Floats]:
@@ -139,7 +139,7 @@ def distances_and_gradients(
     return found, slope
 
 
-@compiled
+@compiled_freely
 def nearest_along(
     values: Floats,
     lower: Array,
@@ -181,7 +181,7 @@ def nearest_along(
     return least, at
 
 
-@compiled
+@inlined
 def _within(start: Array, way: Array, shape: tuple[int, int, int]) -> tuple[float, float]:
     """From where to where, 0 or more, start + z * way, in nodes, is in a grid; the first is the
     larger where it nowhere is."""
@@ -194,7 +194,7 @@ def _within(start: Array, way: Array, shape: tuple[int, int, int]) -> tuple[floa
     return begin, end
 
 
-@compiled
+@compiled_freely
 def explained(
     values: Floats,
     lower: Array,
@@ -210,7 +210,7 @@ def explained(
     of one unit of the grid."""
     found = np.empty(len(T_model_cam))
     flat, nodes = values.ravel(), 1 / spacing
-    points = seen.T.astype(np.float32)
+    points = np.ascontiguousarray(seen.T).astype(np.float32)
     off = np.empty(len(seen), np.float32)
     for b in range(len(T_model_cam)):
         T = T_model_cam[b]
@@ -234,7 +234,7 @@ def explained(
     return found
 
 
-@compiled
+@inlined
 def _far_off(
     flat: Floats,
     shape: tuple[int, int, int],
@@ -255,7 +255,7 @@ def _far_off(
         off[n] = abs(_distance(flat, shape, spacing, x, y, z)) * unit
 
 
-@compiled
+@inlined
 def _to_nodes(T: Array, lower: Array, nodes: float, unit: float) -> Array:
     """(3, 4), from metres to nodes: T (4, 4), and then from metres to nodes of a grid with so many
     of them in each of its units."""
@@ -265,7 +265,7 @@ def _to_nodes(T: Array, lower: Array, nodes: float, unit: float) -> Array:
     return grid
 
 
-@compiled
+@compiled_freely
 def refined(
     values: Floats,
     lower: Array,
@@ -315,7 +315,7 @@ def refined(
     return found
 
 
-@compiled
+@inlined
 def _pull(
     flat: Floats,
     shape: tuple[int, int, int],
@@ -391,7 +391,7 @@ def _pull(
     fall[4], fall[5], fall[6] = f4, f5, f6
 
 
-@compiled
+@inlined
 def _solve(A: Array, b: Array, n: int) -> None:
     """b (n,) becomes the solution of A x = b, in place; A (n, n) is positive definite, and only its
     lower half is read, which becomes its Cholesky factor. LAPACK's takes longer to be compiled in
@@ -411,7 +411,7 @@ def _solve(A: Array, b: Array, n: int) -> None:
         b[i] /= A[i, i]
 
 
-@compiled
+@inlined
 def _move(T: Array, step: Array) -> None:
     """Turn T (4, 4), in place, by step[:3] (Rodrigues), shift it by step[3:6], and resize it by
     exp(step[6])."""

@@ -8,7 +8,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from brrp_cli.compiled import compiled
+from brrp_cli.compiled import compiled_freely
 
 Floats = NDArray[np.float32]
 
@@ -19,7 +19,7 @@ LEAST_STEEPNESS = np.float32(1e-6)
 ZERO, ONE = np.float32(0), np.float32(1)
 
 
-@compiled
+@compiled_freely
 def coarse_distances(
     stance: NDArray[np.int64],
     turn: Floats,

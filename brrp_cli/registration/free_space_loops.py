@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from brrp_cli.compiled import compiled
+from brrp_cli.compiled import compiled_freely
 
 Array = NDArray[np.float64]
 Floats = NDArray[np.float32]
@@ -13,7 +13,7 @@ Floats = NDArray[np.float32]
 ZERO, HALF, ONE = np.float32(0), np.float32(0.5), np.float32(1)
 
 
-@compiled
+@compiled_freely
 def contradicted(
     T_cam_model: Array,
     surface: Array,
@@ -27,7 +27,8 @@ def contradicted(
     """See `Verifier.score`: of placements (B, 4, 4), the shares (B,) of surface points (m, 3) in
     space that `depth` (H, W) shows to be free, and below the plane, together."""
     found = np.empty(len(T_cam_model))
-    points, image, flat = surface.T.astype(np.float32), K.astype(np.float32), depth.ravel()
+    points = np.ascontiguousarray(surface.T).astype(np.float32)
+    image, flat = K.astype(np.float32), depth.ravel()
     up = normal.astype(np.float32)
     above = np.float32(offset + tolerance)
     near, steep = np.float32(tolerance), np.float32(1 / slope)
