@@ -3,8 +3,8 @@
 A grid has nodes lower + spacing * (i, j, k). Distances between nodes are trilinear; off the grid,
 that of its nearest point and the way there. All in one file: see `compiled`.
 
-The inner loops have no branches and no calls, so that the compiler does several points at a time,
-and are in single precision. Sums of many points are in double.
+Loops over points in a grid have no branches and no calls, so that the compiler does several points
+at a time, and are in single precision. Sums of many points are in double.
 """
 
 from __future__ import annotations
