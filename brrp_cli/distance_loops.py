@@ -149,35 +149,49 @@ def nearest_along(
     rays: Array,
 ) -> tuple[Array, Array]:
     """Along rays (n, 3) from the camera, z = 1, as far as they are in the grid: the least distance
-    to the surface, metres, and the depth where that is, (n,) each; inf for rays that miss the grid,
-    and a ray ends where it enters the surface.
+    to the surface, metres, and the depth where that is, (B, n) each; inf for rays that miss the
+    grid, and a ray ends where it enters the surface.
 
-    T_model_cam : (4, 4) rigid; unit : metres of one unit of the grid
+    T_model_cam : (B, 4, 4) rigid; unit : metres of one unit of the grid
     """
-    least, at = np.full(len(rays), np.inf), np.full(len(rays), np.inf)
-    flat = values.ravel()
-    grid = _to_nodes(T_model_cam, lower, 1 / spacing, unit)
-    way = np.empty(3)
-    for n in range(len(rays)):
-        length = 0.0
-        for i in range(3):
-            way[i] = grid[i, 0] * rays[n, 0] + grid[i, 1] * rays[n, 1] + grid[i, 2] * rays[n, 2]
-            length += way[i] * way[i]
-        # Metres of the model for one of depth.
-        length = math.sqrt(length) * spacing * unit
-        z, end = _within(grid[:, 3], way, values.shape)
-        for _ in range(LONGEST_WALK):
-            if z > end:
-                break
-            x, y, w = grid[0, 3] + z * way[0], grid[1, 3] + z * way[1], grid[2, 3] + z * way[2]
-            off = unit * _distance(
-                flat, values.shape, np.float32(spacing), np.float32(x), np.float32(y), np.float32(w)
-            )
-            if off < least[n]:
-                least[n], at[n] = off, z
-            if off <= 0:
-                break
-            z += max(off, SHORTEST_STEP) / length
+    shape = len(T_model_cam), len(rays)
+    least, at = np.full(shape, np.inf), np.full(shape, np.inf)
+    flat, way = values.ravel(), np.empty(3)
+    for b in range(len(T_model_cam)):
+        grid = _to_nodes(T_model_cam[b], lower, 1 / spacing, unit)
+        for n in range(len(rays)):
+            for i in range(3):
+                way[i] = grid[i, 0] * rays[n, 0] + grid[i, 1] * rays[n, 1] + grid[i, 2] * rays[n, 2]
+            least[b, n], at[b, n] = _nearest(flat, values.shape, spacing, unit, grid[:, 3], way)
+    return least, at
+
+
+@inlined
+def _nearest(
+    flat: Floats,
+    shape: tuple[int, int, int],
+    spacing: float,
+    unit: float,
+    start: Array,
+    way: Array,
+) -> tuple[float, float]:
+    """Along one ray, start + z * way, in nodes."""
+    least, at = np.inf, np.inf
+    # Metres of the model for one of depth.
+    length = math.sqrt(way[0] ** 2 + way[1] ** 2 + way[2] ** 2) * spacing * unit
+    z, end = _within(start, way, shape)
+    for _ in range(LONGEST_WALK):
+        if z > end:
+            break
+        x, y, w = start[0] + z * way[0], start[1] + z * way[1], start[2] + z * way[2]
+        off = unit * _distance(
+            flat, shape, np.float32(spacing), np.float32(x), np.float32(y), np.float32(w)
+        )
+        if off < least:
+            least, at = off, z
+        if off <= 0:
+            break
+        z += max(off, SHORTEST_STEP) / length
     return least, at
 
 

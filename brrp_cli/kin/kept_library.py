@@ -7,22 +7,16 @@ vouches for: deleting it costs a few seconds.
 
 from __future__ import annotations
 
-import hashlib
-import json
-import logging
-import zipfile
 from collections import OrderedDict
 from dataclasses import asdict, fields
 from pathlib import Path
 from threading import Lock
-from typing import Any
 
 import numpy as np
 
 from brrp_cli.config import KinConfig
-from brrp_cli.errors import OutputError
-from brrp_cli.files import atomic_path
 from brrp_cli.kin.library import Fields, Library, library_of_prior
+from brrp_cli.prior.beside import keep_beside, path_beside, read_beside
 from brrp_cli.prior.store import Prior
 
 FOLDER = "kin"
@@ -47,8 +41,6 @@ HELD = 2
 _MADE: OrderedDict[Path, Library] = OrderedDict()
 _MAKING = Lock()
 
-log = logging.getLogger(__name__)
-
 
 def kin_library(prior: Prior, config: KinConfig) -> Library:
     """That of a prior: from memory, as it was kept, or made. Errors: PriorError."""
@@ -68,39 +60,27 @@ def kept_path(prior: Prior, config: KinConfig) -> Path:
     """Where the library of this prior is kept."""
     told = asdict(config)
     made_from = [VERSION, prior.digest, [told[name] for name in DECIDING]]
-    digest = hashlib.sha256(json.dumps(made_from).encode()).hexdigest()
-    return prior.path / FOLDER / f"library-{digest[:16]}.npz"
+    return path_beside(prior.path / FOLDER, "library", made_from)
 
 
 def _read(path: Path) -> Library | None:
     """The library as it was kept; None where there is none, or a damaged one."""
-    if not path.is_file():
+    arrays = read_beside(path)
+    if arrays is None:
         return None
     try:
-        with np.load(path, allow_pickle=False) as file:
-            arrays: dict[str, Any] = {name: file[name] for name in file.files}
         of_fields = {each.name: arrays.pop(_PREFIX + each.name) for each in fields(Fields)}
         names, reach = arrays.pop("names").tolist(), float(arrays.pop("reach"))
         return Library(names=names, fields=Fields(**of_fields), reach=reach, **arrays)
-    except (OSError, ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile) as error:
-        log.info("The shapes kept in %s are damaged and are made anew: %s", path, error)
-        return None
+    except (ValueError, KeyError, TypeError):
+        return None  # kept by something else, and made anew
 
 
 def _keep(library: Library, path: Path) -> None:
-    """Write it in the place of what was kept before, or say why not: a prior that cannot be written
-    can still be used."""
     arrays = {_PREFIX + each.name: getattr(library.fields, each.name) for each in fields(Fields)}
     arrays |= {
         each.name: np.asarray(getattr(library, each.name))
         for each in fields(Library)
         if each.name != "fields"
     }
-    try:
-        with atomic_path(path) as partial, partial.open("wb") as stream:
-            np.savez(stream, **arrays)
-        for other in path.parent.glob("library-*.npz"):
-            if other != path:
-                other.unlink(missing_ok=True)
-    except (OutputError, OSError) as error:
-        log.info("Shapes for kin cannot be kept in %s: %s", path.parent, error)
+    keep_beside(path, arrays)

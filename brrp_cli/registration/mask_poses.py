@@ -16,12 +16,10 @@ from brrp_cli.config.registration import MaskPosesConfig
 from brrp_cli.frames.frame import Frame
 from brrp_cli.observation.support_plane import Plane, plane_frame
 from brrp_cli.registration.initial_poses import turns
+from brrp_cli.registration.mask_loops import shifted
 from brrp_cli.registration.model import ModelGeometry
 
 Array = NDArray[np.float64]
-
-# Metres; what is nearer to the camera is not seen.
-NEAREST = 0.01
 
 
 @dataclass(frozen=True)
@@ -103,49 +101,21 @@ def _shifted(
     """Placements (b, 4, 4) shifted along the plane towards the mask in some steps, and by how much
     their outlines then differ from it (b,), as a share of its size; inf for what is then behind
     the camera."""
-    R, t = seen.T_cam_plane[:3, :3], seen.T_cam_plane[:3, 3]
-    T = T_plane_model.copy()
-    points = np.einsum("bij,nj->bni", T[:, :3, :3], surface)
-    points[..., 2] += T[:, None, 2, 3]
-    T[:, :2, 3] = _below(seen, points[..., 2].max(axis=1) / 2)
-    T[:, :2, 3] -= (points[..., :2].min(axis=1) + points[..., :2].max(axis=1)) / 2
-    relative = points @ R.T + t
-    for step in range(config.steps + 1):
-        here = relative + (T[:, :2, 3] @ R[:, :2].T)[:, None]
-        z = np.maximum(here[..., 2], NEAREST)
-        u = here[..., 0] / z * seen.K[0, 0] + seen.K[0, 2]
-        v = here[..., 1] / z * seen.K[1, 1] + seen.K[1, 2]
-        reach = (np.stack([u, v], axis=-1) @ seen.directions.T).max(axis=1)
-        gap = seen.reach - reach
-        if step == config.steps:
-            break
-        # The motion of the image that closes most of the gaps, and that along the plane for it.
-        moved = 2 * gap @ seen.directions / len(seen.directions)
-        middle = here.mean(axis=1)
-        T[:, :2, 3] += _along_plane(moved, middle, R, seen.K)
-    off = np.abs(gap).mean(axis=1) / max(seen.size, 1.0)
-    off[(here[..., 2] <= NEAREST).any(axis=1)] = np.inf
-    return T, off
-
-
-def _below(seen: MaskOutline, heights: Array) -> Array:
-    """Where the ray through the mask's middle meets the heights (b,), metres above the plane,
-    (b, 2)."""
-    u, v = seen.middle
     K, R = seen.K, seen.T_cam_plane[:3, :3]
+    u, v = seen.middle
     ray = R.T @ np.array([(u - K[0, 2]) / K[0, 0], (v - K[1, 2]) / K[1, 1], 1.0])
-    eye = -R.T @ seen.T_cam_plane[:3, 3]
     # A ray that does not come down meets nothing: what it would show stands far away.
-    down = min(ray[2], -1e-3)
-    way = (heights - eye[2]) / down
-    return np.asarray(eye[:2] + way[:, None] * ray[:2])
-
-
-def _along_plane(moved: Array, at: Array, R: Array, K: Array) -> Array:
-    """Shifts (b, 2) along the plane, metres, that move points (b, 3) by `moved` (b, 2) pixels."""
-    z = np.maximum(at[:, 2], NEAREST)[:, None]
-    du = (R[None, 0, :2] - at[:, 0, None] / z * R[None, 2, :2]) * K[0, 0] / z
-    dv = (R[None, 1, :2] - at[:, 1, None] / z * R[None, 2, :2]) * K[1, 1] / z
-    J = np.stack([du, dv], axis=1)
-    J += 1e-9 * np.eye(2)
-    return np.asarray(np.linalg.solve(J, moved[..., None])[..., 0])
+    ray[2] = min(ray[2], -1e-3)
+    eye = -R.T @ seen.T_cam_plane[:3, 3]
+    T, off = shifted(
+        T_plane_model,
+        surface,
+        seen.T_cam_plane,
+        K,
+        eye,
+        ray,
+        seen.reach,
+        seen.directions,
+        config.steps,
+    )
+    return T, off / max(seen.size, 1.0)

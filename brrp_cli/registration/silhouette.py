@@ -66,20 +66,20 @@ def bare_and_spilled(
     seen: Silhouette,
     tolerance: float,
     config: SilhouetteConfig,
-) -> tuple[float, float]:
-    """Of a placement T_cam_model (4, 4), rigid: the share of the mask that the model leaves bare,
-    and what it covers beside the mask with nothing in front, as a share of the mask.
+) -> tuple[Array, Array]:
+    """Of placements T_cam_model (b, 4, 4), rigid: the shares (b,) of the mask that the model leaves
+    bare, and what it covers beside the mask with nothing in front, as shares of the mask (b,).
 
     tolerance : metres by which measured depth errs
     """
-    T_model_cam = inverses(np.ascontiguousarray(T_cam_model, dtype=np.float64)[None])[0]
+    T_model_cam = inverses(np.ascontiguousarray(T_cam_model, dtype=np.float64))
     field, unit = model.field, model.half_extent
     grid = field.values, field.lower, field.spacing, unit, T_model_cam
     off, _ = nearest_along(*grid, seen.own)
-    bare = float((off > max(config.near, config.nodes * field.spacing * unit)).mean())
+    bare = (off > max(config.near, config.nodes * field.spacing * unit)).mean(axis=1)
     off, z = nearest_along(*grid, seen.beside)
     shown = (off < config.touched) & (seen.depth > z - tolerance)
-    return bare, float(shown.sum() * seen.worth)
+    return bare, shown.sum(axis=1) * seen.worth
 
 
 def _evenly(

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import OrderedDict
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from threading import RLock
 from typing import Any
 
 import numpy as np
@@ -16,6 +17,7 @@ from brrp_cli.frames.frame import Frame
 from brrp_cli.geometry import similarity
 from brrp_cli.observation.support_plane import Plane
 from brrp_cli.prior.distance_field import DistanceField
+from brrp_cli.prior.kept_parts import KeptParts, kept_parts
 from brrp_cli.prior.shard import DISTANCES
 from brrp_cli.prior.store import Prior
 from brrp_cli.registration.begin import coarse_score
@@ -45,19 +47,28 @@ PARTS = (
 # beside it.
 Shares = NDArray[np.floating]
 Against = Callable[[Shares, Shares], Shares]
-# Models that are held in memory, 0.14 MB each; and coarser ones, 0.03 MB each.
-HELD, HELD_COARSELY = 1024, 4096
+# Models that are held in memory, 0.14 MB each; those of them that were used last as they are
+# computed with, 0.28 MB each; and coarser ones, 0.03 MB each.
+HELD, READY, HELD_COARSELY = 1024, 128, 4096
 # Models that are made coarser at a time; in use, one takes 0.25 MB.
 AT_A_TIME = 64
+# Objects of the largest prior whose models are kept beside it, 0.14 MB each.
+KEPT = 2048
 
 
 class Aligner:
-    """Places stored objects, and keeps the models that it read last."""
+    """Places stored objects, and holds the models that it read last, or those of all objects as
+    they are kept beside the prior."""
 
     def __init__(self, prior: Prior, config: AlignmentConfig) -> None:
         self._prior = prior
         self._config = config
         self._held: OrderedDict[str, BareModel] = OrderedDict()
+        self._ready: OrderedDict[str, BareModel] = OrderedDict()
+        self._kept: KeptParts | None = None
+        self._sought = False
+        # Objects of a frame are retrieved in several threads.
+        self._reading = RLock()
         self._coarse: OrderedDict[str, BareModel] = OrderedDict()
 
     def on(
@@ -93,33 +104,60 @@ class Aligner:
 
     def models(self, names: Sequence[str]) -> list[BareModel]:
         """The models of objects of these names. Errors: PriorError."""
-        self._read([name for name in names if name not in self._held])
-        found = [self._held[name] for name in names]
-        for name in names:
-            self._held.move_to_end(name)
-        _let_go(self._held, HELD)
-        return [_with_values(model, np.float32) for model in found]
+        with self._reading:
+            self._read([name for name in names if name not in self._ready])
+            found = [self._ready[name] for name in names]
+            for name in names:
+                self._ready.move_to_end(name)
+            _let_go(self._ready, READY)
+            return found
 
     def coarse_models(self, names: Sequence[str]) -> list[BareModel]:
         """The same, as `glance` needs them. Errors: PriorError."""
         points = self._config.glance.model_points
-        new = [name for name in names if name not in self._coarse]
-        for start in range(0, len(new), AT_A_TIME):
-            some = new[start : start + AT_A_TIME]
-            self._coarse |= {
-                name: coarser(model, points)
-                for name, model in zip(some, self.models(some), strict=True)
-            }
-        found = [self._coarse[name] for name in names]
-        for name in names:
-            self._coarse.move_to_end(name)
-        _let_go(self._coarse, HELD_COARSELY)
-        return found
+        with self._reading:
+            new = [name for name in names if name not in self._coarse]
+            if 2 * len(new) > len(self._prior.names):
+                # As good as all have to be read, so they are kept for the next command.
+                self._seek(make=True)
+            for start in range(0, len(new), AT_A_TIME):
+                some = new[start : start + AT_A_TIME]
+                self._coarse |= {
+                    name: coarser(model, points)
+                    for name, model in zip(some, self.models(some), strict=True)
+                }
+            found = [self._coarse[name] for name in names]
+            for name in names:
+                self._coarse.move_to_end(name)
+            _let_go(self._coarse, HELD_COARSELY)
+            return found
 
     def _read(self, names: Sequence[str]) -> None:
-        for name, arrays in self._prior.parts(names, PARTS):
-            model = bare_model(arrays, self._config.search.fine_points)
-            self._held[name] = _with_values(model, np.float16)
+        """Make models of these names ready."""
+        if not names:
+            return
+        self._seek(make=False)
+        points = self._config.search.fine_points
+        if self._kept is not None:
+            self._ready |= {name: bare_model(self._kept.of(name), points) for name in names}
+            return
+        new = [name for name in names if name not in self._held]
+        for name, arrays in self._prior.parts(new, PARTS):
+            self._held[name] = _with_values(bare_model(arrays, points), np.float16)
+        for name in names:
+            self._ready[name] = _with_values(self._held[name], np.float32)
+            self._held.move_to_end(name)
+        _let_go(self._held, HELD)
+
+    def _seek(self, *, make: bool) -> None:
+        """Look once for what is kept beside the prior, or make it."""
+        done = self._kept is not None or (self._sought and not make)
+        if done or len(self._prior.names) > KEPT:
+            return
+        self._sought = True
+        self._kept = kept_parts(self._prior, PARTS, self._config.search.fine_points, make=make)
+        if self._kept is not None:
+            self._held.clear()
 
 
 def _let_go(held: OrderedDict[str, BareModel], most: int) -> None:
@@ -267,11 +305,8 @@ class SeenPart:
     def _shares(self, T_cam_model: NDArray[np.float64], model: BareModel) -> NDArray[np.float64]:
         """Bare and spilled (2, b) of each placement (b, 4, 4)."""
         tolerance = self._search.alignment_score.tolerance
-        shares = [
-            bare_and_spilled(T, model, self._mask.silhouette, tolerance, self._config.silhouette)
-            for T in T_cam_model
-        ]
-        return np.array(shares).reshape(-1, 2).T
+        seen, config = self._mask.silhouette, self._config.silhouette
+        return np.stack(bare_and_spilled(T_cam_model, model, seen, tolerance, config))
 
 
 def bare_model(arrays: dict[str, NDArray[Any]], points: int) -> BareModel:

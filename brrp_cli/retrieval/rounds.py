@@ -51,9 +51,10 @@ class Rounds:
         self._certain = config.alignment.at_once
 
     def run(self, hasty: bool) -> None:
-        """All rounds; in haste, those before the glance. Then the best are placed once more."""
+        """All rounds; in haste, the first alone. Then the best are placed once more."""
         own = self._config.alignment
-        if not self._rounds_end(self._left, lambda count: own.tried) and not hasty:
+        alike_first = own.tried[:1] if hasty else own.tried
+        if not self._rounds_end(self._left, lambda count: alike_first) and not hasty:
             shares = own.blindly if self._placed.blind else own.glanced
             self._rounds_end(
                 self._at_a_glance(),

@@ -36,7 +36,8 @@ def frame():
 
 def compared(frame, model, T_cam_model):
     seen = silhouette(frame, BOX, CONFIG)
-    return bare_and_spilled(T_cam_model, model, seen, TOLERANCE, CONFIG)
+    bare, spilled = bare_and_spilled(T_cam_model[None], model, seen, TOLERANCE, CONFIG)
+    return bare[0], spilled[0]
 
 
 def without_depth(frame: Frame, pixels: np.ndarray) -> Frame:
@@ -89,7 +90,8 @@ def test_rays_pass_a_ball_as_far_as_they_do():
     off = np.array([0.0, 0.04, 0.052, 0.1])
     rays = np.stack([off / 0.5, np.zeros(4), np.ones(4)], axis=1)
     T = similarity(translation=np.array([0, 0, -0.5]))
-    least, at = nearest_along(field.values, field.lower, field.spacing, 0.05, T, rays)
+    least, at = nearest_along(field.values, field.lower, field.spacing, 0.05, T[None], rays)
+    least, at = least[0], at[0]
     passes = 0.5 * np.sin(np.arctan(off / 0.5)) - 0.05
     assert (least[:2] <= 0).all()
     # What is far from it misses the grid.
@@ -110,6 +112,7 @@ def test_rays_do_not_jump_over_what_is_thin():
     )
     across = np.linspace(-0.09, 0.09, 19)
     rays = np.stack([across / 0.5, np.zeros(19), np.ones(19)], axis=1)
-    least, at = nearest_along(field.values, field.lower, field.spacing, 0.1, T, rays)
+    least, at = nearest_along(field.values, field.lower, field.spacing, 0.1, T[None], rays)
+    least, at = least[0], at[0]
     assert (least < 1e-3).all()
     np.testing.assert_allclose(at, 0.497, atol=2e-3)

@@ -1,4 +1,5 @@
 import dataclasses
+import shutil
 
 import numpy as np
 import pytest
@@ -294,6 +295,26 @@ def test_at_a_glance_the_true_object_lies_best(prior):
         seen = aligner.on(points, frame, object_id, plane, 0.0, lambda bare, spilled: 0 * bare)
         best = prior.names[int(seen.glances(prior.names).argmax())]
         assert best == name or {best, name} == {"red_box", "blue_box"}
+
+
+def test_models_that_are_kept_beside_the_prior_are_those_of_the_shards(prior, tmp_path):
+    """A glance at all keeps them, and the next command reads no shard."""
+    copied = tmp_path / "prior"
+    shutil.copytree(prior.path, copied, ignore=lambda *_: ["parts"])
+    own = preset("default").retrieval.alignment
+    fresh, names = Aligner(open_prior(copied), own), prior.names
+    read = fresh.models(names)
+    glanced_at = fresh.coarse_models(names)
+    shutil.rmtree(copied / "shards")
+    kept = Aligner(open_prior(copied), own)
+    found = kept.models(names) + kept.coarse_models(names)
+    for one, other in zip(read + glanced_at, found, strict=True):
+        assert one.half_extent == other.half_extent
+        for arrays in ((one.field.values, other.field.values), (one.surface, other.surface)):
+            assert arrays[0].dtype == arrays[1].dtype
+            np.testing.assert_array_equal(*arrays)
+        np.testing.assert_array_equal(one.normals, other.normals)
+        np.testing.assert_array_equal(one.resting, other.resting)
 
 
 def test_what_looks_do_not_find_a_glance_finds(prior):
