@@ -25,17 +25,14 @@ _SHAPES = " shapes"
 class KeptParts:
     """Arrays of all objects, one object after the other.
 
-    packed : of each array, all its numbers (n,), and under its name and " shapes" the shapes (O, d)
+    packed : of each of the arrays `keys`, all its numbers (n,), and under its name and " shapes"
+    the shapes (O, d). Errors: KeyError, ValueError where it is not of these objects and arrays.
     """
 
-    def __init__(self, names: Sequence[str], packed: Arrays) -> None:
+    def __init__(self, names: Sequence[str], keys: Sequence[str], packed: Arrays) -> None:
         self._rows = {name: row for row, name in enumerate(names)}
         self._packed = packed
-        self._ends = {
-            key: np.cumsum(np.prod(packed[key + _SHAPES], axis=1))
-            for key in packed
-            if not key.endswith(_SHAPES)
-        }
+        self._ends = {key: np.cumsum(np.prod(packed[key + _SHAPES], axis=1)) for key in keys}
         for key, ends in self._ends.items():
             if len(ends) != len(names) or len(packed[key]) != ends[-1]:
                 raise ValueError(f"{key} does not have the numbers of {len(names)} objects")
@@ -64,14 +61,14 @@ def kept_parts(
     packed = read_beside(path)
     if packed is not None:
         try:
-            return KeptParts(prior.names, packed)
-        except (KeyError, ValueError, IndexError):
+            return KeptParts(prior.names, keys, packed)
+        except (KeyError, ValueError):
             pass  # kept by something else, and made anew
     if not make:
         return None
     packed = _packed(prior, keys, first)
     keep_beside(path, packed)
-    return KeptParts(prior.names, packed)
+    return KeptParts(prior.names, keys, packed)
 
 
 def _packed(prior: Prior, keys: Sequence[str], first: int) -> Arrays:

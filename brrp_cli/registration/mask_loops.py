@@ -46,7 +46,7 @@ def shifted(
             most[:] = -np.inf
             for n in range(len(surface)):
                 u, v = pixels[0, n], pixels[1, n]
-                # Over the directions last: of one after the other, maxima wait for each other.
+                # Directions are the inner loop, so that several maxima are taken at a time.
                 for d in range(len(x)):
                     most[d] = max(most[d], x[d] * u + y[d] * v)
             for d in range(len(x)):

@@ -53,8 +53,8 @@ class Rounds:
     def run(self, hasty: bool) -> None:
         """All rounds; in haste, the first alone. Then the best are placed once more."""
         own = self._config.alignment
-        alike_first = own.tried[:1] if hasty else own.tried
-        if not self._rounds_end(self._left, lambda count: alike_first) and not hasty:
+        sizes = own.tried[:1] if hasty else own.tried
+        if not self._rounds_end(self._left, lambda count: sizes) and not hasty:
             shares = own.blindly if self._placed.blind else own.glanced
             self._rounds_end(
                 self._at_a_glance(),

@@ -253,6 +253,20 @@ def test_more_objects_are_tried_until_one_lies_well(prior):
     assert min(aligned(tried=(2,), glanced=(), certain=0.0, at_once=0.0).values()) > 1
 
 
+def test_in_haste_the_first_round_is_all(prior):
+    frame, names = scene()
+    numbers = ONE_BY_ONE | {"tried": (1, 2), "distinct": 1.0}
+    retriever = retriever_of(prior, True, worth=10_000.0, **numbers)
+
+    def tried(object_id):
+        return int((retriever.evidence(frame, [object_id])[object_id].alignment > 0.1).sum())
+
+    plain = int(np.sum(~prior.appearance.first.colour.any(axis=1)))
+    with hasty(retriever):
+        assert {tried(i) for i in names} == {(plain > 0) + 1}
+    assert max(tried(i) for i in names) > (plain > 0) + 1
+
+
 def test_after_a_glance_a_share_of_the_prior_is_tried(prior):
     """Of those with colours and of those without; never fewer than `least` of either."""
     frame, names = scene()
