@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from brrp_cli.config.ranges import share
 
@@ -37,17 +37,33 @@ class ObservationConfig:
 
 
 @dataclass(frozen=True)
+class BledEdgeConfig:
+    """Ramps at an object's upper edge (observation/bled_edges.py).
+
+    steps : of the depth from pixel to pixel, one after the other, at least, each of which is more
+    than `slope` times as long as the pixel is wide there, and less than `jump` metres; border :
+    pixels of the object above them, at most
+    """
+
+    steps: int = 3
+    slope: float = 4.0
+    jump: float = 0.03
+    border: int = 3
+
+
+@dataclass(frozen=True)
 class StrayConfig:
     """Pixels of a mask that are not its object's (observation/strays.py).
 
     link : metres between the depths of neighbouring pixels of one piece, and of scraps from the
         object; reach : metres in depth between the object and its other pieces; share : of the
-        pixels of the largest piece, which one that is no scrap has
+        pixels of the largest piece, which one that is no scrap has; bled : ramps at its upper edge
     """
 
     link: float = 0.02
     reach: float = 0.1
     share: float = share(0.02)
+    bled: BledEdgeConfig = field(default_factory=BledEdgeConfig)
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,5 @@
-"""Pixels of a mask whose depth is not that of its object: what lies far behind it, or before it."""
+"""Pixels of a mask whose depth is not that of its object: what lies far behind it, or before it,
+and ramps that lead there."""
 
 from __future__ import annotations
 
@@ -14,6 +15,7 @@ from scipy.sparse.csgraph import connected_components
 
 from brrp_cli.config.observation import StrayConfig
 from brrp_cli.frames.frame import Frame
+from brrp_cli.observation.bled_edges import bled_pixels
 
 log = logging.getLogger(__name__)
 
@@ -47,8 +49,15 @@ def without_strays(
             rows, columns = np.nonzero(own)
             window = np.s_[rows.min() : rows.max() + 1, columns.min() : columns.max() + 1]
             depth = np.where(own[window], frame.points[..., 2][window], np.nan)
-            found = stray_pixels(depth, config)
-            stray[window] |= found
+            bled = bled_pixels(depth, float(frame.K[1, 1]), config.bled)
+            found = stray_pixels(np.where(bled, np.nan, depth), config)
+            stray[window] |= bled | found
+            if bled.any() and (told is None or object_id in told):
+                log.info(
+                    "Object %d: its mask is left without %d pixel(s) of a ramp to what is behind",
+                    object_id,
+                    bled.sum(),
+                )
             if found.any() and (told is None or object_id in told):
                 log.info(
                     "Object %d: its mask is left without %d pixel(s) far from the object",
