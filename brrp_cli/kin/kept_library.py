@@ -11,8 +11,10 @@ from collections import OrderedDict
 from dataclasses import asdict, fields
 from pathlib import Path
 from threading import Lock
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from brrp_cli.config import KinConfig
 from brrp_cli.kin.library import Fields, Library, library_of_prior
@@ -46,7 +48,7 @@ def kin_library(prior: Prior, config: KinConfig) -> Library:
     """That of a prior: from memory, as it was kept, or made. Errors: PriorError."""
     path = kept_path(prior, config)
     with _MAKING:
-        library = _MADE.pop(path, None) or _read(path)
+        library = _MADE.pop(path, None) or read_beside(path, _of_arrays)
         if library is None:
             library = library_of_prior(prior, config)
             _keep(library, path)
@@ -63,17 +65,11 @@ def kept_path(prior: Prior, config: KinConfig) -> Path:
     return path_beside(prior.path / FOLDER, "library", made_from)
 
 
-def _read(path: Path) -> Library | None:
-    """The library as it was kept; None where there is none, or a damaged one."""
-    arrays = read_beside(path)
-    if arrays is None:
-        return None
-    try:
-        of_fields = {each.name: arrays.pop(_PREFIX + each.name) for each in fields(Fields)}
-        names, reach = arrays.pop("names").tolist(), float(arrays.pop("reach"))
-        return Library(names=names, fields=Fields(**of_fields), reach=reach, **arrays)
-    except (ValueError, KeyError, TypeError):
-        return None  # kept by something else, and made anew
+def _of_arrays(arrays: dict[str, NDArray[Any]]) -> Library:
+    """The library of the arrays that `_keep` kept."""
+    of_fields = {each.name: arrays.pop(_PREFIX + each.name) for each in fields(Fields)}
+    names, reach = arrays.pop("names").tolist(), float(arrays.pop("reach"))
+    return Library(names=names, fields=Fields(**of_fields), reach=reach, **arrays)
 
 
 def _keep(library: Library, path: Path) -> None:

@@ -10,15 +10,17 @@ import hashlib
 import json
 import logging
 import zipfile
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from brrp_cli.errors import OutputError
 from brrp_cli.files import atomic_path
+
+T = TypeVar("T")
 
 log = logging.getLogger(__name__)
 
@@ -30,13 +32,14 @@ def path_beside(folder: Path, stem: str, made_from: object) -> Path:
     return folder / f"{stem}-{digest[:16]}.npz"
 
 
-def read_beside(path: Path) -> dict[str, NDArray[Any]] | None:
-    """The arrays as they were kept; None where there are none, or damaged ones."""
+def read_beside(path: Path, made_of: Callable[[dict[str, NDArray[Any]]], T]) -> T | None:
+    """What `made_of` makes of the arrays that were kept; None where there are none, or others than
+    it expects (KeyError, ValueError, TypeError), or damaged ones."""
     if not path.is_file():
         return None
     try:
         with np.load(path, allow_pickle=False) as file:
-            return {name: file[name] for name in file.files}
+            return made_of({name: file[name] for name in file.files})
     except (OSError, ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile) as error:
         log.info("%s is damaged and is made anew: %s", path, error)
         return None

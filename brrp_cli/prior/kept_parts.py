@@ -58,14 +58,9 @@ def kept_parts(
     """
     made_from = [VERSION, prior.digest, list(keys), first]
     path = path_beside(prior.path / "parts", "parts", made_from)
-    packed = read_beside(path)
-    if packed is not None:
-        try:
-            return KeptParts(prior.names, keys, packed)
-        except (KeyError, ValueError):
-            pass  # kept by something else, and made anew
-    if not make:
-        return None
+    kept = read_beside(path, lambda packed: KeptParts(prior.names, keys, packed))
+    if kept is not None or not make:
+        return kept
     packed = _packed(prior, keys, first)
     keep_beside(path, packed)
     return KeptParts(prior.names, keys, packed)

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from table_scene import box, photograph
+from table_scene import box, in_camera, photograph, placed
 
 from brrp_cli.config import StrayConfig
 from brrp_cli.observation.strays import stray_pixels, without_strays
@@ -68,3 +68,21 @@ def test_a_frame_without_strays_is_the_same_and_one_with_them_is_as_without():
     np.testing.assert_array_equal(cleaned.valid, frame.valid & ~away)
     np.testing.assert_array_equal(cleaned.points[~away], frame.points[~away])
     np.testing.assert_array_equal(cleaned.segmap, frame.segmap)
+
+
+def test_a_ramp_at_the_upper_edge_has_no_depth_and_stays_in_the_mask():
+    frame = photograph({ID: in_camera(box(), placed(0.0, 0.0, 0.3))})
+    rows, columns = np.nonzero(frame.segmap == ID)
+    top = rows.min()
+    edge = np.arange(columns.min(), columns.max() + 1)[:, None], np.arange(top - 6, top)
+    points, segmap = frame.points.copy(), frame.segmap.copy()
+    segmap[edge[1], edge[0]] = ID
+    # From the nearest depth on: 15 mm further in every pixel, which is 1 to 2 mm wide.
+    depth = np.nanmin(frame.depth[frame.segmap == ID]) + 0.015 * np.arange(6, 0, -1)
+    points[edge[1], edge[0]] *= (depth / points[edge[1], edge[0], 2])[..., None]
+    cleaned = without_strays(replace(frame, points=points, segmap=segmap), CONFIG)
+    # The innermost of the six is where the ramp begins, as near as the box.
+    assert not cleaned.valid[edge[1], edge[0]][:, :-1].any()
+    np.testing.assert_array_equal(cleaned.segmap, segmap)
+    own = frame.segmap == ID
+    assert cleaned.valid[own].mean() > 0.95
