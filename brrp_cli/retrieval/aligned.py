@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-from collections import OrderedDict
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from threading import RLock
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,14 +11,9 @@ from numpy.typing import NDArray
 from brrp_cli.config import SearchConfig, VerificationConfig
 from brrp_cli.config.retrieval import AlignmentConfig
 from brrp_cli.frames.frame import Frame
-from brrp_cli.geometry import similarity
 from brrp_cli.observation.support_plane import Plane
-from brrp_cli.prior.distance_field import DistanceField
-from brrp_cli.prior.kept_parts import KeptParts, kept_parts
-from brrp_cli.prior.shard import DISTANCES
-from brrp_cli.prior.store import Prior
 from brrp_cli.registration.begin import coarse_score
-from brrp_cli.registration.glance import coarser, glance
+from brrp_cli.registration.glance import glance
 from brrp_cli.registration.mask_poses import MaskOutline, mask_outline, poses_from_mask
 from brrp_cli.registration.model import BareModel
 from brrp_cli.registration.quick_alignment import (
@@ -32,145 +24,42 @@ from brrp_cli.registration.quick_alignment import (
 )
 from brrp_cli.registration.silhouette import Silhouette, bare_and_spilled, silhouette
 from brrp_cli.registration.verification import Verifier
+from brrp_cli.retrieval.held_models import HeldModels
 
-# What is read of each object.
-PARTS = (
-    "box",
-    "surface",
-    "surface_normals",
-    "pose_T",
-    f"{DISTANCES}/lower",
-    f"{DISTANCES}/spacing",
-    f"{DISTANCES}/values",
-)
 # What speaks against placements (b,), from the shares of the mask that they leave bare, and cover
 # beside it.
 Shares = NDArray[np.floating]
 Against = Callable[[Shares, Shares], Shares]
-# Models that are held in memory, 0.14 MB each; those of them that were used last as they are
-# computed with, 0.28 MB each; and coarser ones, 0.03 MB each.
-HELD, READY, HELD_COARSELY = 1024, 128, 4096
-# Models that are made coarser at a time; in use, one takes 0.25 MB.
-AT_A_TIME = 64
-# Objects of the largest prior whose models are kept beside it, 0.14 MB each.
-KEPT = 2048
 
 
-class Aligner:
-    """Places stored objects, and holds the models that it read last, or those of all objects as
-    they are kept beside the prior."""
+def seen_part(
+    points: NDArray[np.floating],
+    frame: Frame,
+    object_id: int,
+    plane: Plane,
+    wave: float,
+    models: HeldModels,
+    config: AlignmentConfig,
+    against: Against,
+) -> SeenPart:
+    """What objects are laid over: points (n, 3) of an object, metres, camera frame, in random
+    order.
 
-    def __init__(self, prior: Prior, config: AlignmentConfig) -> None:
-        self._prior = prior
-        self._config = config
-        self._held: OrderedDict[str, BareModel] = OrderedDict()
-        self._ready: OrderedDict[str, BareModel] = OrderedDict()
-        self._kept: KeptParts | None = None
-        self._sought = False
-        # Objects of a frame are retrieved in several threads.
-        self._reading = RLock()
-        self._coarse: OrderedDict[str, BareModel] = OrderedDict()
-
-    def on(
-        self,
-        points: NDArray[np.floating],
-        frame: Frame,
-        object_id: int,
-        plane: Plane,
-        wave: float,
-        against: Against,
-    ) -> SeenPart:
-        """What objects are laid over: points (n, 3) of an object, metres, camera frame, in random
-        order.
-
-        wave : metres, by which the frame's depth errs over patches (observation/sensor_noise.py)
-        against : what silhouettes say against placements, in alignment scores
-        """
-        search = replace(
-            self._config.search,
-            alignment_score=tolerant(
-                self._config.search.alignment_score, self._config.waves * wave
-            ),
-        )
-        verifier = Verifier(points.astype(np.float64), frame, plane)
-        own = self._config
-        blind = len(points) < own.blind * (frame.segmap == object_id).sum()
-        mask = Mask(
-            silhouette(frame, object_id, own.silhouette),
-            mask_outline(frame, object_id, plane, own.by_mask),
-            blind,
-        )
-        return SeenPart(self, verifier, mask, search, own, against)
-
-    def models(self, names: Sequence[str]) -> list[BareModel]:
-        """The models of objects of these names. Errors: PriorError."""
-        with self._reading:
-            self._read([name for name in names if name not in self._ready])
-            found = [self._ready[name] for name in names]
-            for name in names:
-                self._ready.move_to_end(name)
-            _let_go(self._ready, READY)
-            return found
-
-    def coarse_models(self, names: Sequence[str]) -> list[BareModel]:
-        """The same, as `glance` needs them. Errors: PriorError."""
-        points = self._config.glance.model_points
-        with self._reading:
-            new = [name for name in names if name not in self._coarse]
-            if 2 * len(new) > len(self._prior.names):
-                # As good as all have to be read, so they are kept for the next command.
-                self._seek(make=True)
-            for start in range(0, len(new), AT_A_TIME):
-                some = new[start : start + AT_A_TIME]
-                self._coarse |= {
-                    name: coarser(model, points)
-                    for name, model in zip(some, self.models(some), strict=True)
-                }
-            found = [self._coarse[name] for name in names]
-            for name in names:
-                self._coarse.move_to_end(name)
-            _let_go(self._coarse, HELD_COARSELY)
-            return found
-
-    def _read(self, names: Sequence[str]) -> None:
-        """Make models of these names ready."""
-        if not names:
-            return
-        self._seek(make=False)
-        points = self._config.search.fine_points
-        if self._kept is not None:
-            self._ready |= {name: bare_model(self._kept.of(name), points) for name in names}
-            return
-        new = [name for name in names if name not in self._held]
-        for name, arrays in self._prior.parts(new, PARTS):
-            self._held[name] = _with_values(bare_model(arrays, points), np.float16)
-        for name in names:
-            self._ready[name] = _with_values(self._held[name], np.float32)
-            self._held.move_to_end(name)
-        _let_go(self._held, HELD)
-
-    def _seek(self, *, make: bool) -> None:
-        """Look once for what is kept beside the prior, or make it."""
-        done = self._kept is not None or (self._sought and not make)
-        if done or len(self._prior.names) > KEPT:
-            return
-        self._sought = True
-        self._kept = kept_parts(self._prior, PARTS, self._config.search.fine_points, make=make)
-        if self._kept is not None:
-            self._held.clear()
-
-
-def _let_go(held: OrderedDict[str, BareModel], most: int) -> None:
-    """Of what was not used for longest, until so many are left."""
-    while len(held) > most:
-        held.popitem(last=False)
-
-
-def _with_values(model: BareModel, kind: type[np.floating]) -> BareModel:
-    """With distances in another precision: they are kept in the one in which they are stored, half
-    the memory of that in which they are computed with."""
-    field = model.field
-    return replace(model, field=replace(field, values=field.values.astype(kind)))
+    wave : metres, by which the frame's depth errs over patches (observation/sensor_noise.py)
+    against : what silhouettes say against placements, in alignment scores
+    """
+    search = replace(
+        config.search,
+        alignment_score=tolerant(config.search.alignment_score, config.waves * wave),
+    )
+    verifier = Verifier(points.astype(np.float64), frame, plane)
+    blind = len(points) < config.blind * (frame.segmap == object_id).sum()
+    mask = Mask(
+        silhouette(frame, object_id, config.silhouette),
+        mask_outline(frame, object_id, plane, config.by_mask),
+        blind,
+    )
+    return SeenPart(models, verifier, mask, search, config, against)
 
 
 def tolerant(score: VerificationConfig, deviation: float) -> VerificationConfig:
@@ -199,14 +88,14 @@ class SeenPart:
 
     def __init__(
         self,
-        aligner: Aligner,
+        models: HeldModels,
         verifier: Verifier,
         mask: Mask,
         search: SearchConfig,
         config: AlignmentConfig,
         against: Against,
     ) -> None:
-        self._aligner = aligner
+        self._models = models
         self._against = against
         self._verifier = verifier
         self._mask = mask
@@ -222,7 +111,7 @@ class SeenPart:
 
     def glances(self, names: Sequence[str]) -> NDArray[np.float64]:
         """Scores (m,) of the objects of these names at a glance. Errors: PriorError."""
-        models = self._aligner.coarse_models(names)
+        models = self._models.coarse(names)
         search = replace(self._config.glance, alignment_score=self._search.alignment_score)
         return np.array([glance(model, self._verifier, search) for model in models])
 
@@ -230,7 +119,7 @@ class SeenPart:
         """Alignment scores (m,) of the objects of these names after the first few steps; of what
         depth shows a part of, less what their silhouettes say against them. Errors: PriorError."""
         found = []
-        for name, model in zip(names, self._aligner.models(names), strict=True):
+        for name, model in zip(names, self._models.of(names), strict=True):
             first, against = self._begun(model)
             self._first[name] = first
             found.append(first.score - against)
@@ -238,7 +127,7 @@ class SeenPart:
 
     def scores(self, names: Sequence[str]) -> NDArray[np.float64]:
         """Alignment scores (m,) of objects that `first_scores` was asked for."""
-        models = self._aligner.models(names)
+        models = self._models.of(names)
         first = [self._first[name] for name in names]
         ordered = self._best_agreeing if self._mask.blind else None
         placed = aligned(models, first, self._verifier, self._search, ordered)
@@ -250,7 +139,7 @@ class SeenPart:
         placements of an object those are refined, and the one of them is kept, whose score less
         what silhouettes say against it is best."""
         search = replace(self._config.finest, alignment_score=self._search.alignment_score)
-        for name, model in zip(names, self._aligner.models(names), strict=True):
+        for name, model in zip(names, self._models.of(names), strict=True):
             placed = self._placed[name].first(self._search.fine)
             placed = finely(self._agreeing(placed, model), model, self._verifier, search)
             self._placed[name] = self._agreeing(placed, model)
@@ -259,7 +148,7 @@ class SeenPart:
     def silhouettes(self, names: Sequence[str]) -> NDArray[np.float64]:
         """(2, m) of the placements of objects that `scores` was asked for: shares of the mask that
         they leave bare, and cover beside it (registration/silhouette.py)."""
-        models = self._aligner.models(names)
+        models = self._models.of(names)
         found = [
             self._shares(self._placed[name].T_cam_model[:1], model)
             for name, model in zip(names, models, strict=True)
@@ -270,7 +159,7 @@ class SeenPart:
         """The same (2, m) of the placements that the mask alone suggests; all of it, of an object
         that rests in no pose. Errors: PriorError."""
         found = np.ones((2, len(names)))
-        for row, model in enumerate(self._aligner.models(names)):
+        for row, model in enumerate(self._models.of(names)):
             shares = self._shares(self._by_mask(model), model)
             if shares.shape[1]:
                 found[:, row] = shares[:, self._against(*shares).argmin()]
@@ -307,21 +196,3 @@ class SeenPart:
         tolerance = self._search.alignment_score.tolerance
         seen, config = self._mask.silhouette, self._config.silhouette
         return np.stack(bare_and_spilled(T_cam_model, model, seen, tolerance, config))
-
-
-def bare_model(arrays: dict[str, NDArray[Any]], points: int) -> BareModel:
-    """The model of an object's arrays (`PARTS`), with so many points of its surface."""
-    lower, upper = arrays["box"]
-    half = float((upper - lower).max() / 2)
-    T_object_model = similarity(translation=(lower + upper) / 2)
-    return BareModel(
-        field=DistanceField(
-            lower=arrays[f"{DISTANCES}/lower"],
-            spacing=float(arrays[f"{DISTANCES}/spacing"][0]),
-            values=arrays[f"{DISTANCES}/values"].astype(np.float32),
-        ),
-        half_extent=half,
-        surface=arrays["surface"][:points].astype(np.float64) * half,
-        normals=arrays["surface_normals"][:points].astype(np.float64),
-        resting=[T @ T_object_model for T in arrays["pose_T"]],
-    )

@@ -13,7 +13,8 @@ from brrp_cli.config.retrieval import RetrievalConfig
 from brrp_cli.frames.frame import Frame
 from brrp_cli.observation.support_plane import Plane
 from brrp_cli.prior.store import Prior
-from brrp_cli.retrieval.aligned import Aligner, SeenPart, Shares
+from brrp_cli.retrieval.aligned import SeenPart, Shares, seen_part
+from brrp_cli.retrieval.held_models import HeldModels
 from brrp_cli.retrieval.illuminants import lights
 from brrp_cli.retrieval.observed_appearance import see_object
 from brrp_cli.retrieval.placed_objects import PlacedObjects
@@ -35,7 +36,7 @@ class Steps:
         self._made_of = prior, config, seed
         self._looks = prior.appearance
         self._shortlist = Shortlist(self._looks.first, own)
-        self._aligner = Aligner(prior, own.alignment)
+        self._models = HeldModels(prior, own.alignment)
         self.gains = lights(own.illuminants)
         self.aligns = len(prior.names) >= own.alignment.from_objects
         self._similarity = own.similarity
@@ -82,7 +83,16 @@ class Steps:
             return nats / max(fusion.alignment, 1.0)
 
         shuffled = points[np.random.default_rng(seed).permutation(len(points))]
-        seen = self._aligner.on(shuffled, image.frame, object_id, image.plane, image.wave, against)
+        seen = seen_part(
+            shuffled,
+            image.frame,
+            object_id,
+            image.plane,
+            image.wave,
+            self._models,
+            own,
+            against,
+        )
         names = [prior.names[row] for row in look.rows]
         if len(points) < own.least_points:
             rows = np.sort(alike(likely, own.margin))

@@ -15,9 +15,10 @@ from brrp_cli.prior.parameters import BuildParameters
 from brrp_cli.prior.store import open_prior
 from brrp_cli.registration.model import search_model
 from brrp_cli.retrieval import steps
-from brrp_cli.retrieval.aligned import PARTS, Aligner, bare_model
+from brrp_cli.retrieval.aligned import seen_part
 from brrp_cli.retrieval.appearance import AppearanceRetriever
 from brrp_cli.retrieval.base import hasty, helped, one_image, sendable, unknown
+from brrp_cli.retrieval.held_models import PARTS, HeldModels, bare_model
 
 PLACES = {3: (-0.15, 0.1), 4: (0.12, 0.14), 8: (0.0, -0.02), 9: (0.2, -0.1), 11: (-0.2, -0.14)}
 STRANGER = 20
@@ -222,12 +223,20 @@ def test_silhouettes_choose_among_the_placements_of_an_object(prior):
     own = config.retrieval.alignment
     frame, names = scene()
     plane = scene_plane(frame, config.observation, 0)
+    models = HeldModels(prior, own)
 
     def off(object_id, worth):
         """What the placements that are kept leave bare and cover beside the mask, in all."""
         points = np.random.default_rng(0).permutation(frame.object_points(object_id))
-        seen = Aligner(prior, own).on(
-            points, frame, object_id, plane, 0.0, lambda bare, spilled: worth * (bare + spilled)
+        seen = seen_part(
+            points,
+            frame,
+            object_id,
+            plane,
+            0.0,
+            models,
+            own,
+            lambda bare, spilled: worth * (bare + spilled),
         )
         seen.first_scores(prior.names)
         seen.scores(prior.names)
@@ -303,10 +312,13 @@ def test_at_a_glance_the_true_object_lies_best(prior):
     config = preset("default")
     frame, names = scene()
     plane = scene_plane(frame, config.observation, 0)
-    aligner = Aligner(prior, config.retrieval.alignment)
+    own = config.retrieval.alignment
+    models = HeldModels(prior, own)
     for object_id, name in names.items():
         points = np.random.default_rng(0).permutation(frame.object_points(object_id))
-        seen = aligner.on(points, frame, object_id, plane, 0.0, lambda bare, spilled: 0 * bare)
+        seen = seen_part(
+            points, frame, object_id, plane, 0.0, models, own, lambda bare, spilled: 0 * bare
+        )
         best = prior.names[int(seen.glances(prior.names).argmax())]
         assert best == name or {best, name} == {"red_box", "blue_box"}
 
@@ -316,12 +328,12 @@ def test_models_that_are_kept_beside_the_prior_are_those_of_the_shards(prior, tm
     copied = tmp_path / "prior"
     shutil.copytree(prior.path, copied, ignore=lambda *_: ["parts"])
     own = preset("default").retrieval.alignment
-    fresh, names = Aligner(open_prior(copied), own), prior.names
-    read = fresh.models(names)
-    glanced_at = fresh.coarse_models(names)
+    fresh, names = HeldModels(open_prior(copied), own), prior.names
+    read = fresh.of(names)
+    glanced_at = fresh.coarse(names)
     shutil.rmtree(copied / "shards")
-    kept = Aligner(open_prior(copied), own)
-    found = kept.models(names) + kept.coarse_models(names)
+    kept = HeldModels(open_prior(copied), own)
+    found = kept.of(names) + kept.coarse(names)
     for one, other in zip(read + glanced_at, found, strict=True):
         assert one.half_extent == other.half_extent
         for arrays in ((one.field.values, other.field.values), (one.surface, other.surface)):
