@@ -91,14 +91,14 @@ class RevolutionConfig:
     aside: float = 0.5
     least_aside: float = share(0.3)
     meets: float = 0.3
-    least_round: float = share(0.88)
+    least_round: float = share(0.82)
     sectors: int = 36
     least_sector: float = share(0.005)
     least_covered: float = share(0.33)
     most_scatter: float = 0.002
     within: float = share(0.9)
     leaning: float = 1.1
-    most_oval: float = share(0.2)
+    most_oval: float = share(0.23)
     levels: int = 24
     strays: float = share(0.05)
     neighbours: int = 12
