@@ -23,12 +23,11 @@ from brrp_cli.frames.frame import Frame
 from brrp_cli.geometry import normalise, transform_points
 from brrp_cli.kin.evidence import OtherDepth
 from brrp_cli.methods.base import EarlierView
-from brrp_cli.observation.pixel_noise import PixelNoise
 from brrp_cli.observation.ray_samples import ObjectObservation
 from brrp_cli.observation.soft_samples import SoftSamples, soft_samples
 from brrp_cli.observation.support_plane import Plane
 from brrp_cli.prior.store import Prior
-from brrp_cli.registration.likelihood import SeenObject, see
+from brrp_cli.registration.likelihood import SeenObject
 from brrp_cli.registration.model import search_model
 from brrp_cli.registration.pose_search import Hypothesis, start_from
 from brrp_cli.registration.ray_refinement import OtherRays
@@ -98,10 +97,10 @@ class Remembered:
 def remember(
     frame: Frame,
     plane: Plane | None,
-    noise: PixelNoise,
     wave: float,
     observation: ObjectObservation,
     points: Array,
+    seen: SeenObject,
     probabilities: Array,
     placed: Sequence[tuple[Hypothesis, float]],
     ratios: dict[str, float],
@@ -114,11 +113,7 @@ def remember(
 ) -> Remembered:
     """An object after inference, for the frames to come; placed : hypotheses and weights; the rest
     as of `Remembered`."""
-    sensor = config.sensor
-    seen = see(
-        frame, observation.object_id, plane, noise, sensor.patch, sensor.bleed, config.likelihood
-    )
-    samples = soft_samples(observation, frame, config.map.behind, sensor)
+    samples = soft_samples(observation, frame, config.map.behind, config.sensor)
     rows = rng.permutation(len(samples.points))[:most_samples]
     thinned = SoftSamples(samples.points[rows], samples.targets[rows], samples.measured[rows])
     return Remembered(

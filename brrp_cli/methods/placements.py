@@ -1,0 +1,241 @@
+"""Which stored objects lie where: searched for in what is seen of one, judged and weighed."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brrp_cli.config import HypothesesConfig
+from brrp_cli.methods.earlier_views import EarlierViews
+from brrp_cli.methods.scene import Scene
+from brrp_cli.observation.ray_samples import ObjectObservation
+from brrp_cli.reconstruction import Retrieved
+from brrp_cli.registration.likelihood import SeenObject, evidence, log_likelihood, see
+from brrp_cli.registration.model import Model, search_model
+from brrp_cli.registration.pose_search import Hypothesis, search
+from brrp_cli.registration.refined import refined
+from brrp_cli.registration.scale_scan import observed_cloud
+from brrp_cli.registration.turned import turned
+from brrp_cli.registration.verification import Verifier
+from brrp_cli.registration.weigh import (
+    SeenFrom,
+    best_ratios,
+    joint_log_likelihood,
+    judged,
+    weigh,
+)
+from brrp_cli.retrieval.base import unknown
+from brrp_cli.seeds import child_seed
+
+Array = NDArray[np.float64]
+# Name and P(c|R) of stored objects.
+Chosen = Sequence[tuple[str, float]]
+
+
+@dataclass(frozen=True)
+class Placements:
+    """Where retrieved objects may lie.
+
+    chosen : the m objects that were tried; counts : (m,) how many placements there are of each
+    placed : all n of them, in the order of `chosen`, the best of each object first
+    alone : (n,) log likelihood ratios in this frame, nats, against that it is none of them
+    weights : (n + 1,) of the placements, and last that it is none of them
+    """
+
+    chosen: Chosen
+    counts: Sequence[int]
+    placed: Sequence[Hypothesis]
+    alone: Sequence[float]
+    weights: Array
+
+    @property
+    def unknown(self) -> float:
+        """Weight of "none of them"."""
+        return float(self.weights[-1])
+
+    @property
+    def heaviest(self) -> float:
+        """Weight of the heaviest stored object, of all of its placements."""
+        return max((float(self.weights[a:b].sum()) for a, b in self._groups()), default=0.0)
+
+    def ratios(self) -> dict[str, float]:
+        """Of each object the best log likelihood ratio in this frame, nats."""
+        return best_ratios(list(self.placed), list(self.alone))
+
+    def retrieved(self) -> list[Retrieved]:
+        """Each object with its best placement and the weight of all of them."""
+        return [
+            _retrieved(name, probability, self.placed[a:b], float(self.weights[a:b].sum()))
+            for (name, probability), (a, b) in zip(self.chosen, self._groups(), strict=True)
+        ]
+
+    def _groups(self) -> Iterable[tuple[int, int]]:
+        return pairwise(np.cumsum([0, *self.counts]).tolist())
+
+
+class Placer:
+    """Looks for stored objects in what is seen of one object."""
+
+    def __init__(
+        self,
+        scene: Scene,
+        observation: ObjectObservation,
+        verifier: Verifier,
+        config: HypothesesConfig,
+        views: EarlierViews,
+    ) -> None:
+        image, sensor = scene.image, config.sensor
+        self._scene = scene
+        self._observation = observation
+        self._verifier = verifier
+        self._config = config
+        self._views = views
+        self._observed = observed_cloud(observation.points, scene.config.features)
+        self._seen = see(
+            scene.frame,
+            observation.object_id,
+            image.plane,
+            image.noise,
+            sensor.patch,
+            sensor.bleed,
+            config.likelihood,
+        )
+
+    def placements(self, chosen: Chosen, begun: dict[str, list[Hypothesis]]) -> Placements:
+        """Of the objects `chosen`. `begun` : those that start from earlier frames, by name; they
+        are searched for too where that leaves doubt. Errors: PriorError."""
+        views = self._views
+        lost = views.lost(self._config) if begun else frozenset()
+        skipped = frozenset(begun) | lost | views.hopeless()
+        found = self._weighed(chosen, self._searched(chosen, begun, skipped))
+        if begun and found.heaviest < views.config.sure:
+            # What started from the last frame is not sure: it is searched for as ever.
+            found = self._weighed(chosen, self._searched(chosen, begun, views.hopeless()))
+        return found
+
+    def settled(
+        self, found: Placements, kept: NDArray[np.int64]
+    ) -> tuple[Placements, dict[int, Array]]:
+        """The placements with those of the indices `kept` brought nearer and turned as is most
+        probable, and by index the turns (K, 4, 4), T_cam_model, that are as good."""
+        placed, alike = list(found.placed), {}
+        for i in kept.tolist():
+            placed[i] = self._nearer(placed[i])
+            if not self._views:
+                best = turned(
+                    placed[i],
+                    self._verifier,
+                    self._config.sensor.patch,
+                    self._config.search,
+                    partial(self._log_likelihood, placed[i].model),
+                    self._nearer,
+                )
+                placed[i], alike[i] = best.best, best.alike
+        return replace(found, placed=placed), alike
+
+    def _searched(
+        self, chosen: Chosen, begun: dict[str, list[Hypothesis]], skipped: frozenset[str]
+    ) -> list[list[Hypothesis]]:
+        """Placements of each object; of those that are skipped, the ones that were begun."""
+        config, scene = self._config.search, self._scene
+        found: list[list[Hypothesis]] = []
+        # P(c|R) of the most probable object that explains what is seen.
+        explained = 0.0
+        for name, probability in chosen:
+            if name in skipped:
+                found.append(begun.get(name, []))
+                continue
+            if probability < config.unlikely * explained:
+                found.append([])
+                continue
+            best = (each.alignment_score for group in found for each in group)
+            found.append(
+                search(
+                    search_model(scene.prior.load(name)),
+                    self._observed,
+                    self._verifier,
+                    scene.config.features,
+                    config,
+                    child_seed(scene.seed, self._observation.object_id),
+                    max(best, default=-np.inf),
+                )
+            )
+            if found[-1][0].alignment_score >= config.explained:
+                explained = max(explained, probability)
+        return found
+
+    def _weighed(self, chosen: Chosen, found: list[list[Hypothesis]]) -> Placements:
+        views = self._views
+        placed = [each for group in found for each in group]
+        shares = [p for (_, p), group in zip(chosen, found, strict=True) for _ in group]
+        placed, alone = judged(placed, self._seen, self._config, self._nearer)
+        joint = alone
+        if views and max(alone, default=-np.inf) > -views.config.against:
+            placed, joint = self._in_all_views(placed, alone)
+        # Stored objects that are not tried are as good as not in the prior.
+        none_tried = unknown(np.array([probability for _, probability in chosen]))
+        weights = weigh(shares, joint, none_tried, self._config.weigh)
+        return Placements(chosen, [len(group) for group in found], placed, alone, weights)
+
+    def _in_all_views(
+        self, placed: list[Hypothesis], alone: list[float]
+    ) -> tuple[list[Hypothesis], list[float]]:
+        """Placements fitted to the rays of all views, and their log likelihood ratios in all of
+        them: of those whose ratio in this frame, `alone`, comes near the best."""
+        views = self._views
+        every = [SeenFrom(self._seen, np.eye(4)), *views.seen()]
+        votes = views.votes(self._observation.center)
+        near = [ratio > max(alone) - views.config.worth for ratio in alone]
+        placed = [
+            self._nearer(each) if asked else each for each, asked in zip(placed, near, strict=True)
+        ]
+        asked_ratios = [
+            joint_log_likelihood(each, every, votes, self._config) if asked else -np.inf
+            for each, asked in zip(placed, near, strict=True)
+        ]
+        # The others stay as far behind as they were.
+        gained = max(asked_ratios) - max(alone)
+        joint = [
+            ratio if asked else before + gained
+            for ratio, before, asked in zip(asked_ratios, alone, near, strict=True)
+        ]
+        return placed, joint
+
+    def _nearer(self, each: Hypothesis) -> Hypothesis:
+        wave = self._scene.image.wave
+        return refined(each, self._verifier, wave, self._config, self._views.rays())
+
+    def _log_likelihood(self, model: Model, T_cam_model: Array) -> float:
+        """Of a placement, against that it is none of the stored objects, nats."""
+        likelihood = self._config.likelihood
+        found = evidence(T_cam_model, model, self._seen, likelihood, self._config.search.colour)
+        return log_likelihood(found, likelihood)
+
+    @property
+    def seen(self) -> SeenObject:
+        """The object's pixels, as placements are judged by them."""
+        return self._seen
+
+
+def _retrieved(
+    name: str, probability: float, group: Sequence[Hypothesis], weight: float
+) -> Retrieved:
+    """The object with its best placement, and the weight of all of them."""
+    if not group:
+        return Retrieved(name, probability, weight=weight)
+    best = group[0]
+    T_cam_mesh, _ = best.model.stored.mesh_pose(best.T_cam_object)
+    return Retrieved(
+        name,
+        probability,
+        best.T_cam_object,
+        T_cam_mesh,
+        best.scale,
+        alignment_score=best.alignment_score,
+        weight=weight,
+    )
