@@ -123,7 +123,8 @@ def _reconstruct(
             device=plan.device if method.uses_cuda else "cpu",
             prior=prior,
             retriever=retriever,
-            weights=None if variant.weights is None else plan.weights[variant.weights],
+            # Where none are given, each worker takes its own installation's.
+            weights=plan.weights.get(variant.weights or ""),
             # Scenes are shared out among processes.
             workers=1,
         )
@@ -234,10 +235,11 @@ def _row(
 
 
 def _seconds(item: ObjectReconstruction, retriever: RememberingRetriever | None) -> dict[str, Any]:
-    """Seconds of each stage; a remembered answer counts as long as the first one took."""
+    """Seconds of each stage; remembered answers count as long as the first ones took, each object
+    an equal share of them."""
     seconds = dict(item.seconds)
     if retriever is not None and item.object_id in retriever.seconds:
-        seconds["retrieval"] = retriever.seconds[item.object_id]
+        seconds["retrieval"] = sum(retriever.seconds.values()) / len(retriever.seconds)
     stages = {f"seconds_{s}": round(seconds[s], 4) for s in STAGES if s in seconds}
     return {**stages, "seconds_total": round(sum(seconds.values()), 4)}
 

@@ -70,6 +70,10 @@ def run(frame: Frame, setup: Setup) -> Reconstruction:
 
         ids = [i for i in frame.object_ids if setup.only is None or i in setup.only]
         objects = list(progress(in_threads(whole, ids, workers), "objects", len(ids)))
+    for item in objects:
+        if item.seconds:
+            # The first answer is the work of all objects, which get equal shares of it.
+            item.seconds = {"retrieval": retriever.seconds / len(ids), **item.seconds}
     return Reconstruction(
         frame=given,
         objects=objects,

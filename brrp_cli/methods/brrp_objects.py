@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -48,12 +47,7 @@ def by_hypotheses(
     ):
 
         def retrieved(object_id: int) -> ObjectReconstruction:
-            start = time.perf_counter()
-            probabilities = retriever.probabilities(scene.frame, object_id)
-            seconds = time.perf_counter() - start
-            item = work(object_id, probabilities)
-            item.seconds = {"retrieval": seconds, **item.seconds}
-            return item
+            return work(object_id, retriever.probabilities(scene.frame, object_id))
 
         yield lambda object_id: guarded(object_id, lambda: retrieved(object_id))
 

@@ -35,9 +35,8 @@ def reconstruct_object(
     """
     seconds: dict[str, float] = {}
     object_id = observation.object_id
-    with timed(seconds, "retrieval"):
-        probabilities = retriever.probabilities(frame, object_id)
-        chosen = top_k(probabilities, prior.names, config.k)
+    probabilities = retriever.probabilities(frame, object_id)
+    chosen = top_k(probabilities, prior.names, config.k)
     with timed(seconds, "registration"):
         observed = observed_cloud(observation.points, config.features)
         placed = [

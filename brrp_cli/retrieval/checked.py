@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from threading import Lock
 
 import numpy as np
@@ -17,11 +18,15 @@ ROUNDING = 1e-3
 
 class CheckedRetriever:
     """P(c|R) of `retriever` over `count` objects. Errors: RetrievalError for what is no such
-    thing."""
+    thing.
+
+    seconds : that its answers took so far, without what callers waited for one another
+    """
 
     def __init__(self, retriever: Retriever, count: int) -> None:
         self._retriever = retriever
         self._count = count
+        self.seconds = 0.0
         # Retrievers answer for all objects of a frame at the first question about one.
         self._asked = Lock()
 
@@ -41,7 +46,9 @@ class CheckedRetriever:
     def probabilities(self, frame: Frame, object_id: int) -> NDArray[np.float64]:
         """P(c|R) (n,) for one object."""
         with self._asked:
+            start = time.perf_counter()
             answer = np.asarray(self._retriever.probabilities(frame, object_id), dtype=np.float64)
+            self.seconds += time.perf_counter() - start
         good = answer.shape == (self._count,) and bool((answer >= 0).all())
         if not good or not answer.sum() <= 1 + ROUNDING:
             raise RetrievalError(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from dataclasses import replace
 
 import numpy as np
@@ -166,6 +167,24 @@ class Sure:
 
     def probabilities(self, frame, object_id):
         return self.shares
+
+
+def test_objects_share_the_time_of_retrieval_equally(folder, truth):
+    """The first answer is the work of all, however long others wait for it meanwhile."""
+
+    class Slow:
+        name = "slow"
+        answered = False
+
+        def probabilities(self, frame, object_id):
+            if not self.answered:
+                time.sleep(0.4)
+            self.answered = True
+            return np.array([0.5, 0.5])
+
+    found = reconstruct(photograph(truth), open_prior(folder), retriever=Slow(), workers=2)
+    shares = [item.seconds["retrieval"] for item in found.objects]
+    assert shares[0] == shares[1] and 0.4 <= sum(shares) < 0.7
 
 
 def test_what_is_improbable_beside_an_explanation_is_not_placed(folder, truth):
