@@ -123,8 +123,7 @@ def _reconstruct(
             device=plan.device if method.uses_cuda else "cpu",
             prior=prior,
             retriever=retriever,
-            # Where none are given, each worker takes its own installation's.
-            weights=plan.weights.get(variant.weights or ""),
+            weights=None if variant.weights is None else plan.weights[variant.weights],
             # Scenes are shared out among processes.
             workers=1,
         )
