@@ -1,0 +1,54 @@
+"""What placements tell of the stored objects that were tried."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from table_scene import placed, stored
+
+from brrp_cli.geometry import similarity
+from brrp_cli.methods.placements import Placements
+from brrp_cli.registration.model import search_model
+from brrp_cli.registration.pose_search import Hypothesis
+
+STANDING = placed(0.02, -0.03, 0.5)
+TO_MIDDLE = similarity(translation=np.array([0, 0, 0.07]))
+
+
+def hypothesis(name, T_cam_mesh, score):
+    return Hypothesis(search_model(stored(name)), T_cam_mesh @ TO_MIDDLE, 1.0, score)
+
+
+@pytest.fixture
+def found():
+    """Two placements of the box, none of the ball, one of the fruit."""
+    boxes = [hypothesis("box", STANDING, 0.9), hypothesis("box", placed(0.1, 0, 0), 0.6)]
+    fruit = hypothesis("fruit", placed(-0.1, 0, 0), 0.5)
+    return Placements(
+        chosen=[("box", 0.6), ("ball", 0.2), ("fruit", 0.1)],
+        counts=[2, 0, 1],
+        placed=[*boxes, fruit],
+        alone=[3.0, -1.0, 2.0],
+        weights=np.array([0.5, 0.1, 0.15, 0.25]),
+    )
+
+
+def test_an_object_has_the_weight_of_all_of_its_placements(found):
+    assert [each.weight for each in found.retrieved()] == pytest.approx([0.6, 0.0, 0.15])
+    assert found.heaviest == pytest.approx(0.6) and found.unknown == 0.25
+
+
+def test_an_object_lies_where_its_best_placement_is(found):
+    box, ball, _ = found.retrieved()
+    assert (box.name, box.probability, box.alignment_score) == ("box", 0.6, 0.9)
+    np.testing.assert_allclose(box.T_cam_mesh, STANDING, atol=1e-6)
+    assert ball.T_cam_object is None and ball.T_cam_mesh is None
+
+
+def test_of_an_object_the_best_ratio_counts(found):
+    assert found.ratios() == {"box": 3.0, "fruit": 2.0}
+
+
+def test_nothing_was_tried():
+    none = Placements([], [], [], [], np.array([1.0]))
+    assert none.heaviest == 0 and none.unknown == 1 and none.retrieved() == []
