@@ -23,7 +23,7 @@ def run(frame: Frame, setup: Setup) -> Reconstruction:
     from brrp_cli.device import pick_device
     from brrp_cli.methods.brrp_objects import by_hypotheses
     from brrp_cli.methods.brrp_paper import reconstruct_object
-    from brrp_cli.methods.each_object import too_few, with_surface
+    from brrp_cli.methods.each_object import share_retrieval, too_few, with_surface
     from brrp_cli.methods.scene import look_at
     from brrp_cli.observation.ray_samples import sampled_scene
     from brrp_cli.observation.strays import without_strays
@@ -70,10 +70,7 @@ def run(frame: Frame, setup: Setup) -> Reconstruction:
 
         ids = [i for i in frame.object_ids if setup.only is None or i in setup.only]
         objects = list(progress(in_threads(whole, ids, workers), "objects", len(ids)))
-    for item in objects:
-        if item.seconds:
-            # The first answer is the work of all objects, which get equal shares of it.
-            item.seconds = {"retrieval": retriever.seconds / len(ids), **item.seconds}
+    share_retrieval(objects, retriever.seconds)
     return Reconstruction(
         frame=given,
         objects=objects,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 from brrp_cli.config import SurfaceConfig
 from brrp_cli.errors import BrrpError, PriorError
@@ -60,6 +60,14 @@ def too_few(object_id: int, count: int, needed: int) -> ObjectReconstruction:
     """An object of `count` points where `needed` are the least that the method works with."""
     message = f"{count} valid depth points, {needed} are needed"
     return ObjectReconstruction(object_id, TOO_FEW_POINTS, message, n_points=count)
+
+
+def share_retrieval(objects: Sequence[ObjectReconstruction], seconds: float) -> None:
+    """Give each object an equal share of the seconds that retrieval took: its first answer about a
+    frame is the work of all objects. Those of too few points are not asked about."""
+    asked = [item for item in objects if item.status != TOO_FEW_POINTS]
+    for item in asked:
+        item.seconds = {"retrieval": seconds / len(asked), **item.seconds}
 
 
 def _add_surface(result: ObjectReconstruction, config: SurfaceConfig) -> None:

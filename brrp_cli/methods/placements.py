@@ -65,7 +65,7 @@ class Placements:
 
     def ratios(self) -> dict[str, float]:
         """Of each object the best log likelihood ratio in this frame, nats."""
-        return best_ratios(list(self.placed), list(self.alone))
+        return best_ratios(self.placed, self.alone)
 
     def retrieved(self) -> list[Retrieved]:
         """Each object with its best placement and the weight of all of them."""
@@ -79,7 +79,10 @@ class Placements:
 
 
 class Placer:
-    """Looks for stored objects in what is seen of one object."""
+    """Looks for stored objects in what is seen of one object.
+
+    seen : its pixels, as placements are judged by them
+    """
 
     def __init__(
         self,
@@ -96,7 +99,7 @@ class Placer:
         self._config = config
         self._views = views
         self._observed = observed_cloud(observation.points, scene.config.features)
-        self._seen = see(
+        self.seen: SeenObject = see(
             scene.frame,
             observation.object_id,
             image.plane,
@@ -173,7 +176,7 @@ class Placer:
         views = self._views
         placed = [each for group in found for each in group]
         shares = [p for (_, p), group in zip(chosen, found, strict=True) for _ in group]
-        placed, alone = judged(placed, self._seen, self._config, self._nearer)
+        placed, alone = judged(placed, self.seen, self._config, self._nearer)
         joint = alone
         if views and max(alone, default=-np.inf) > -views.config.against:
             placed, joint = self._in_all_views(placed, alone)
@@ -188,7 +191,7 @@ class Placer:
         """Placements fitted to the rays of all views, and their log likelihood ratios in all of
         them: of those whose ratio in this frame, `alone`, comes near the best."""
         views = self._views
-        every = [SeenFrom(self._seen, np.eye(4)), *views.seen()]
+        every = [SeenFrom(self.seen, np.eye(4)), *views.seen()]
         votes = views.votes(self._observation.center)
         near = [ratio > max(alone) - views.config.worth for ratio in alone]
         placed = [
@@ -213,13 +216,8 @@ class Placer:
     def _log_likelihood(self, model: Model, T_cam_model: Array) -> float:
         """Of a placement, against that it is none of the stored objects, nats."""
         likelihood = self._config.likelihood
-        found = evidence(T_cam_model, model, self._seen, likelihood, self._config.search.colour)
+        found = evidence(T_cam_model, model, self.seen, likelihood, self._config.search.colour)
         return log_likelihood(found, likelihood)
-
-    @property
-    def seen(self) -> SeenObject:
-        """The object's pixels, as placements are judged by them."""
-        return self._seen
 
 
 def _retrieved(

@@ -18,13 +18,17 @@ if TYPE_CHECKING:
 
 def run(frame: Frame, setup: Setup) -> Reconstruction:
     """The k most probable stored objects for each object of the frame, not placed."""
+    from brrp_cli.methods.each_object import share_retrieval
     from brrp_cli.reconstruction import Reconstruction
 
     config, prior, retriever = setup.config, setup.prior, setup.retriever
     assert isinstance(config, Config) and prior is not None and retriever is not None
+    start = time.perf_counter()
+    objects = [_retrieve(frame, i, prior, retriever, config.k) for i in frame.object_ids]
+    share_retrieval(objects, time.perf_counter() - start)
     return Reconstruction(
         frame=frame,
-        objects=[_retrieve(frame, i, prior, retriever, config.k) for i in frame.object_ids],
+        objects=objects,
         plane=None,
         method=METHOD.name,
         retriever=retriever.name,
@@ -42,7 +46,6 @@ def _retrieve(
     from brrp_cli.reconstruction import OK, ObjectReconstruction, Retrieved
     from brrp_cli.retrieval.base import top_k, unknown
 
-    start = time.perf_counter()
     probabilities = retriever.probabilities(frame, object_id)
     return ObjectReconstruction(
         object_id,
@@ -50,7 +53,6 @@ def _retrieve(
         n_points=len(frame.object_points(object_id)),
         retrieved=[Retrieved(n, p) for n, p in top_k(probabilities, prior.names, k)],
         unknown_probability=unknown(probabilities),
-        seconds={"retrieval": time.perf_counter() - start},
     )
 
 

@@ -72,8 +72,8 @@ def test_an_upright_axis_is_taken_where_it_is_as_good():
     assert found is not None and abs(found.direction @ UP) > 0.999
 
 
-@pytest.mark.parametrize(("astray", "told"), [(0.14, True), (0.3, False)])
-def test_wavy_depth_leaves_a_can_round_until_a_quarter_of_its_normals_are_astray(astray, told):
+@pytest.mark.parametrize(("astray", "told"), [(0.19, True), (0.3, False)])
+def test_wavy_depth_leaves_a_can_round_until_too_many_of_its_normals_are_astray(astray, told):
     points, normals = frustum(0.04, 0.04, 0.1, count=2000)
     rng = np.random.default_rng(0)
     lost = rng.random(len(points)) < astray
