@@ -2,9 +2,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from painted_retrieval import painted_prior, retriever_of
 from small_clip import RGB, write_immich, write_manifest, write_xenova
 
 from brrp_cli.frames.frame import Frame
+from brrp_cli.prior.store import Prior
+from brrp_cli.retrieval.appearance import AppearanceRetriever
 
 
 @pytest.fixture(scope="session")
@@ -44,3 +47,14 @@ def coloured_frame() -> Frame:
     return Frame(
         rgb=rgb, points=np.ones((60, 80, 3), np.float32), segmap=segmap, K=np.eye(3, dtype=float)
     )
+
+
+@pytest.fixture(scope="session")
+def prior(tmp_path_factory: pytest.TempPathFactory) -> Prior:
+    """The five painted things."""
+    return painted_prior(tmp_path_factory.mktemp("painted"))
+
+
+@pytest.fixture
+def aligner(prior: Prior) -> AppearanceRetriever:
+    return retriever_of(prior, True)

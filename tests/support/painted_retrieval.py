@@ -1,0 +1,56 @@
+"""Retrieval on the painted scene, with a prior of its five things."""
+
+import dataclasses
+from pathlib import Path
+
+from painted_scene import STRANGE, THINGS, photograph, write_things
+
+from brrp_cli.config import FeatureConfig, preset
+from brrp_cli.prior.build.build import build_prior
+from brrp_cli.prior.parameters import BuildParameters
+from brrp_cli.prior.store import Prior, open_prior
+from brrp_cli.retrieval.appearance import AppearanceRetriever
+
+PLACES = {3: (-0.15, 0.1), 4: (0.12, 0.14), 8: (0.0, -0.02), 9: (0.2, -0.1), 11: (-0.2, -0.14)}
+STRANGER = 20
+# Rounds of one object each, none of which ends them.
+ONE_BY_ONE = {
+    "tried": (1,),
+    "glanced": (0.0,) * 4,
+    "least": 1,
+    "margin": 100.0,
+    "unaligned": 0.1,
+    "certain": 0.0,
+    "at_once": 0.0,
+}
+
+
+def painted_prior(folder: Path) -> Prior:
+    parameters = BuildParameters(
+        samples=400,
+        surface_points=200,
+        dense_points=2_000,
+        features=FeatureConfig(scales=(1.0,)),
+    )
+    build_prior(write_things(folder / "meshes"), folder / "prior", parameters, workers=1)
+    return open_prior(folder / "prior")
+
+
+def retriever_of(prior, aligned, name="default", worth=None, **numbers):
+    """Of a small prior, whose objects are aligned only where that is asked for; worth : nats of an
+    alignment score of 1."""
+    config = preset(name)
+    if aligned:
+        alignment = dataclasses.replace(config.retrieval.alignment, from_objects=1, **numbers)
+        fusion = config.retrieval.fusion
+        if worth is not None:
+            fusion = dataclasses.replace(fusion, alignment=worth)
+        own = dataclasses.replace(config.retrieval, alignment=alignment, fusion=fusion)
+        config = dataclasses.replace(config, retrieval=own)
+    return AppearanceRetriever(prior, config, 0)
+
+
+def scene(light=(1.0, 1.0, 1.0)):
+    names = dict(zip(PLACES, THINGS, strict=True))
+    placed = {i: (*THINGS[name], *PLACES[i]) for i, name in names.items()}
+    return photograph(placed | {STRANGER: (*STRANGE, 0.0, 0.2)}, light), names
