@@ -42,7 +42,7 @@ from brrp_cli.registration.weigh import weigh
 
 FITTED = (
     "depth",
-    "depth_aligned",
+    "misfit",
     "missed",
     "covered",
     "free_space",
@@ -101,7 +101,7 @@ def main(
 
 def ratios(mask: Mask, config: LikelihoodConfig) -> NDArray[np.float64]:
     """Log likelihood ratios (C,), nats, of the placements of one mask."""
-    depth = config.depth_aligned if mask.aligned else config.depth
+    depth = 0.0 if mask.aligned else config.depth
     return np.array(
         [
             config.base
@@ -113,6 +113,7 @@ def ratios(mask: Mask, config: LikelihoodConfig) -> NDArray[np.float64]:
                 - config.unmasked * each.unmasked
             )
             / (1 + each.votes / config.most_votes)
+            - config.misfit * each.misfit
             - config.below * each.below
             + config.colour * each.colour
             - config.other_size * each.resized

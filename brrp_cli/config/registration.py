@@ -289,10 +289,11 @@ class LikelihoodConfig:
 
     rays_across_patch : rays along the side of a patch (`SensorConfig.patch`); least_share : of its
     rays that have to be compared
-    misfit : metres, standard deviation by which stored meshes and poses are off; reach : metres,
-    larger residuals count as this large; strays : share of patches that are off by anything within
-    `reach`; other_shape : metres, standard deviation by which another shape is off where it was
-    fitted, other_strays : and its strays
+    stored_off : metres, standard deviation of stored meshes and poses; most_deviations, reach :
+    larger residuals count as this large, in the sensor's deviations and in metres
+    strays : share of patches that are off by anything within `reach`; other_shape : metres,
+    standard deviation by which another shape is off where it was fitted, other_strays : and its
+    strays
     free : metres behind the rendered depth from which on a measured one says that it is not there;
     nearer, it may be the object's;
     on_table : metres, own pixels no higher may be the table's: none of them is missed
@@ -300,10 +301,10 @@ class LikelihoodConfig:
     to count fully; surface_points : of the model that are asked
     colours : pixels of the object, and around it, whose colours unmasked pixels are compared with;
     colour_spread : L*a*b*, by which those of one thing differ
-    depth, missed, covered, free_space, unmasked, below, colour : nats for a nat of depth residuals,
-    a vote of missed, covered, free or unmasked pixels, all of the surface below the table, full
-    correlation of colours; depth_aligned : takes the place of `depth` where P(c|R) follows from how
-    stored objects lie over the measured depth, which would count twice
+    depth, misfit, missed, covered, free_space, unmasked, below, colour : nats for a nat of depth
+    residuals, a standard deviation of misfit, a vote of missed, covered, free or unmasked pixels,
+    all of the surface below the table, full correlation of colours; `depth` counts nothing where
+    P(c|R) follows from how stored objects lie over the measured depth, which would count twice
     most_votes : that all votes can come to; base : nats of any placement
     other_size : nats against a placement at another size than the stored one
     within : placements whose alignment score is less than the best by more have no weight, nor have
@@ -314,7 +315,8 @@ class LikelihoodConfig:
 
     rays_across_patch: float = 3.0
     least_share: float = share(0.3)
-    misfit: float = 0.0005
+    stored_off: float = 0.0005
+    most_deviations: float = 6.0
     reach: float = 0.03
     strays: float = share(0.1)
     other_shape: float = 0.0033
@@ -326,8 +328,8 @@ class LikelihoodConfig:
     surface_points: int = 600
     colours: int = 150
     colour_spread: float = 6.0
-    depth: float = 5.1
-    depth_aligned: float = 0.39
+    depth: float = 2.7
+    misfit: float = 2.2
     missed: float = 34.0
     covered: float = 0.95
     free_space: float = 20.7
@@ -335,7 +337,7 @@ class LikelihoodConfig:
     below: float = 49.0
     colour: float = 5.5
     most_votes: float = 1.03
-    base: float = between(1.0, -50.0, 50.0)
+    base: float = between(1.3, -50.0, 50.0)
     other_size: float = 3.6
     within: float = 0.5
     least_alignment: float = between(0.25, -1.0, 1.0)

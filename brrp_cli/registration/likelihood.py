@@ -8,6 +8,8 @@ was measured:
                  normal, ln [(1 - e) N(r; 0, v) + e U] - ln [(1 - e') N(r; 0, v + s^2) + e' U];
                  v is the sensor's variance there (observation/pixel_noise.py), s how far a shape
                  that is another one is off where it was fitted, e and e' the shares of strays
+    misfit       how many of the sensor's standard deviations the patches are off on average, over
+                 how many of them err as one
     silhouette   own pixels that the mesh leaves bare, or covers
     free space   pixels of others which the mesh would hide and does not
     unmasked     pixels that the mesh would show, by their depth, and that belong to no object: each
@@ -41,6 +43,9 @@ from brrp_cli.registration.surroundings import Surroundings, like_surroundings, 
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
+
+# Mean of |x| of a standard normal x.
+NOISE_ALONE = float(np.sqrt(2 / np.pi))
 
 
 @dataclass(frozen=True)
@@ -206,7 +211,13 @@ def log_likelihood(found: PlacementEvidence, config: LikelihoodConfig) -> float:
         - config.free_space * found.free
         - config.unmasked * found.unmasked
     ) / (1 + votes / config.most_votes)
-    return config.base + counted - config.below * found.below + config.colour * found.colour
+    return (
+        config.base
+        + counted
+        - config.misfit * misfit(found, config)
+        - config.below * found.below
+        + config.colour * found.colour
+    )
 
 
 def depth_ratio(found: PlacementEvidence, config: LikelihoodConfig) -> Array:
@@ -219,6 +230,20 @@ def depth_ratio(found: PlacementEvidence, config: LikelihoodConfig) -> Array:
     placed = density(found.variance, config.strays)
     other = density(found.variance + config.other_shape**2, config.other_strays)
     return np.asarray(np.log(placed) - np.log(other))
+
+
+def misfit(found: PlacementEvidence, config: LikelihoodConfig) -> float:
+    """Mean over patches of |residual| in the sensor's standard deviations, over how many patches
+    err as one; what noise alone makes where none is compared.
+
+    A shape that looks alike is off by little, but everywhere. Long waves of a sensor are so, too:
+    where they are long, this says little.
+    """
+    compared = float(found.share.sum())
+    if not compared:
+        return NOISE_ALONE / found.patches_per_vote
+    off = np.minimum(np.abs(found.residual) / np.sqrt(found.variance), config.most_deviations)
+    return float((found.share * off).sum() / compared / found.patches_per_vote)
 
 
 def _window(T_cam_model: Array, model: Model, seen: SeenObject) -> tuple[slice, slice]:
@@ -264,7 +289,7 @@ def _patches(
         return np.zeros(0), np.zeros(0), np.zeros(0)
     residual = mean(np.clip(behind, -config.reach, config.reach) * lean)
     by_sensor = (seen.wave**2 + mean(fine) ** 2 / count) * mean(lean**2)
-    variance = by_sensor + config.misfit**2
+    variance = by_sensor + config.stored_off**2
     share = np.minimum(count / seen.rays_per_patch, 1.0)
     enough = share >= config.least_share
     return residual[enough], variance[enough], share[enough]

@@ -25,11 +25,10 @@ class SeenFrom:
 
 
 def counted_once(config: HypothesesConfig, knows_depth: bool) -> HypothesesConfig:
-    """With less worth of depth residuals where P(c|R) follows from depth already."""
-    likelihood = config.likelihood
+    """Without depth residuals where P(c|R) follows from depth already."""
     if not knows_depth:
         return config
-    return replace(config, likelihood=replace(likelihood, depth=likelihood.depth_aligned))
+    return replace(config, likelihood=replace(config.likelihood, depth=0.0))
 
 
 def judged(

@@ -15,6 +15,7 @@ from brrp_cli.registration.likelihood import (
     PlacementEvidence,
     evidence,
     log_likelihood,
+    misfit,
     see,
 )
 from brrp_cli.registration.model import search_model
@@ -85,7 +86,29 @@ def test_residuals_are_the_sensors_and_so_are_votes(ball):
     correlated = replace(ball, patches_per_vote=4 * ball.patches_per_vote)
     other = look_at("ball", T, correlated)
     assert other.covered == pytest.approx(found.covered / 4)
-    assert log_likelihood(other, CONFIG) < log_likelihood(found, CONFIG)
+    beside = shifted(T, x=0.005)
+    less, more = (nats("ball", T, seen) - nats("ball", beside, seen) for seen in (correlated, ball))
+    assert 0 < less < more
+
+
+def test_a_shape_that_is_off_by_little_everywhere_is_told_by_its_misfit():
+    """As far as patches err independently, and no further than `most_deviations`."""
+
+    def of(deviations, patches_per_vote=1.0):
+        off = np.asarray(deviations) * 0.001
+        return PlacementEvidence(
+            off, 0 * off + 1e-6, 0 * off + 1, patches_per_vote, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+        )
+
+    assert misfit(of([2.0, -2.0]), CONFIG) == pytest.approx(2)
+    assert misfit(of([2.0, -2.0], 4.0), CONFIG) == pytest.approx(0.5)
+    assert misfit(of([0.0, 50.0]), CONFIG) == pytest.approx(CONFIG.most_deviations / 2)
+    noise = np.random.default_rng(0).standard_normal(20_000)
+    assert misfit(of(noise), CONFIG) == pytest.approx(misfit(of([]), CONFIG), rel=0.02)
+    retrieved = replace(CONFIG, depth=0.0)
+    assert log_likelihood(of([1.5] * 9), retrieved) == pytest.approx(
+        log_likelihood(of([0.5] * 9), retrieved) - CONFIG.misfit
+    )
 
 
 def test_however_many_patches_there_are_they_count_as_so_many_votes():

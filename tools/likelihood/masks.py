@@ -21,7 +21,13 @@ from brrp_cli.observation.sensor_noise import wave_deviation
 from brrp_cli.observation.strays import without_strays
 from brrp_cli.prior.store import Prior
 from brrp_cli.raycast import raycasting_scene
-from brrp_cli.registration.likelihood import PlacementEvidence, depth_ratio, evidence, see
+from brrp_cli.registration.likelihood import (
+    PlacementEvidence,
+    depth_ratio,
+    evidence,
+    misfit,
+    see,
+)
 from brrp_cli.registration.model import search_model
 from brrp_cli.registration.pose_search import Hypothesis, search
 from brrp_cli.registration.refined import refined
@@ -39,11 +45,12 @@ NEAR = 0.005
 
 @dataclass(frozen=True)
 class Placed:
-    """What speaks for one placement: P(c|R), nats by depth, votes, and what `PlacementEvidence`
-    has; whether its size is another one, and whether it is right."""
+    """What speaks for one placement: P(c|R), nats by depth, misfit, votes, and what
+    `PlacementEvidence` has; whether its size is another one, and whether it is right."""
 
     share: float
     depth: float
+    misfit: float
     votes: float
     missed: float
     covered: float
@@ -158,6 +165,7 @@ def placed(
     return Placed(
         share=float(share),
         depth=by_depth / told.patches_per_vote,
+        misfit=misfit(told, likelihood),
         votes=float(told.share.sum() / told.patches_per_vote),
         missed=told.missed,
         covered=told.covered,
