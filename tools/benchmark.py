@@ -37,7 +37,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from plain.reconstruct import STAGES, reconstruct_plainly
 from speed.denormals import by_folder, watch_denormals
-from speed.frames import four_objects
+from speed.frames import four_objects, with_objects
 from speed.growth import cases
 from speed.machine import Machine, limits, measure_machine
 from speed.measure import cold_reconstruct, own_megabytes, peak_megabytes, run, spread
@@ -202,8 +202,13 @@ def measure(
     if plain:
         found["plain"] = {**plain, "cpu": plain_cpu, "objects_timed": options.plain_objects}
     if options.cold:
-        found["cold"] = _cold(frame, prior)
+        found["cold"] = [_cold(with_objects(frame, count), prior) for count in _counts(frame)]
     return found
+
+
+def _counts(frame: Frame) -> list[int]:
+    """One object, and all of them."""
+    return sorted({1, len(frame.object_ids)})
 
 
 def _seconds(result: Reconstruction, stage: str) -> float:
@@ -230,14 +235,15 @@ def _plain(frame: Frame, prior: Prior, options: Options) -> tuple[dict[str, floa
 
 
 def _cold(frame: Frame, prior: Prior) -> dict[str, float]:
+    count = len(frame.object_ids)
     with tempfile.TemporaryDirectory() as folder:
         save_frame(frame, Path(folder) / "frame.npz")
         cold = cold_reconstruct(Path(folder) / "frame.npz", prior.path, Path(folder) / "result")
     click.echo(
-        f"  cold `brrp reconstruct`: {cold.cpu:.2f} s of CPU, {cold.wall:.2f} s, "
+        f"  cold `brrp reconstruct`, objects: {count}, {cold.cpu:.2f} s of CPU, {cold.wall:.2f} s, "
         f"{cold.megabytes:.0f} MB at most"
     )
-    return asdict(cold)
+    return {"objects": count, **asdict(cold)}
 
 
 def measure_sets(

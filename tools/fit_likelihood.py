@@ -19,6 +19,7 @@ from __future__ import annotations
 
 import json
 import sys
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -61,6 +62,7 @@ PULL = 1.0
 @click.option("--data-root", type=click.Path(path_type=Path))
 @click.option("--segment", "segmented", is_flag=True, help="Masks from the frame alone.")
 @click.option("--report", is_flag=True, help="Fit nothing: report with the constants in use.")
+@click.option("--only", default=",".join(FITTED), help="Constants to fit. [default: all]")
 @click.option("-o", "--output", required=True, type=click.Path(path_type=Path))
 @click.argument("sets", nargs=-1, type=click.Path(path_type=Path))
 def main(
@@ -68,10 +70,14 @@ def main(
     data_root: Path | None,
     segmented: bool,
     report: bool,
+    only: str,
     output: Path,
     sets: tuple[Path, ...],
 ) -> None:
     """Collect from SETS, folders of scenes, into OUTPUT; fit on all that OUTPUT holds."""
+    names = tuple(only.split(","))
+    if set(names) - set(FITTED):
+        raise click.UsageError(f"--only takes some of {','.join(FITTED)}")
     masks = read(output)
     try:
         prior = open_prior(prior_path)
@@ -91,8 +97,8 @@ def main(
     config = preset("default")
     assert config.hypotheses is not None
     if not report:
-        fitted = fit(masks, config)
-        for name in FITTED:
+        fitted = fit(masks, config, names)
+        for name in names:
             before = getattr(config.hypotheses.likelihood, name)
             click.echo(f"{name}: {getattr(fitted, name):.2f} (in use {before:.2f})")
         tell(masks, with_likelihood(config, fitted), "fitted")
@@ -140,8 +146,8 @@ def loss(masks: list[Mask], config: Config) -> float:
     return total / len(masks)
 
 
-def fit(masks: list[Mask], config: Config) -> LikelihoodConfig:
-    """The constants of least loss, pulled to those in use."""
+def fit(masks: list[Mask], config: Config, names: Sequence[str] = FITTED) -> LikelihoodConfig:
+    """The constants `names` of least loss, pulled to those in use, like the others."""
     from scipy.optimize import minimize
 
     assert config.hypotheses is not None
@@ -152,7 +158,7 @@ def fit(masks: list[Mask], config: Config) -> LikelihoodConfig:
             name: float(getattr(start, name) + value)
             if name == "base"
             else float(getattr(start, name) * np.exp(value))
-            for name, value in zip(FITTED, x, strict=True)
+            for name, value in zip(names, x, strict=True)
         }
         return replace(start, **changed)
 
@@ -160,7 +166,7 @@ def fit(masks: list[Mask], config: Config) -> LikelihoodConfig:
         pulled = PULL * float((x**2).sum()) / len(masks)
         return loss(masks, with_likelihood(config, constants(x))) + pulled
 
-    return constants(minimize(worth, np.zeros(len(FITTED)), method="L-BFGS-B").x)
+    return constants(minimize(worth, np.zeros(len(names)), method="L-BFGS-B").x)
 
 
 def with_likelihood(config: Config, likelihood: LikelihoodConfig) -> Config:
@@ -188,10 +194,11 @@ def tell(masks: list[Mask], config: Config, what: str) -> None:
         large = np.array([mask.stored and mask.pixels >= 1000 for mask in mine])
         stranger = np.array([not mask.stored for mask in mine])
         taken = known > 0.5
+        recognised = (taken & hit)[large].mean() if large.any() else np.nan
         click.echo(
             f"  {group}: {len(mine)} masks, loss {loss(mine, config):.3f}, "
             f"ECE {expected_calibration_error(known, right):.3f}; recognised "
-            f"{(taken & hit)[large].mean():.3f} of {large.sum()}; taken wrongly "
+            f"{recognised:.3f} of {large.sum()}; taken wrongly "
             f"{(taken & ~hit).mean():.3f} of all, "
             f"{taken[stranger].sum()} of {stranger.sum()} others"
         )

@@ -75,3 +75,9 @@ def test_masks_are_read_as_they_were_written(tmp_path):
     found = masks(3)
     path.write_text("".join(json.dumps(as_json(mask)) + "\n" for mask in found))
     assert read(path) == found
+
+
+def test_constants_that_are_not_named_stay_as_they_are():
+    spoilt = replace(LikelihoodConfig(), base=9.0, missed=0.5)
+    fitted = fit(masks(25), with_likelihood(CONFIG, spoilt), ["base"])
+    assert fitted.base < 9 and replace(fitted, base=9.0) == spoilt
