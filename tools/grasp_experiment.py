@@ -59,7 +59,7 @@ DRIFT = 0.005
 @click.option("--prior", "prior_path", type=click.Path(path_type=Path))
 @click.option("--data-root", type=click.Path(path_type=Path), help="Mesh paths are relative to it.")
 @click.option("--methods", default=",".join(METHODS), show_default=True, help="Also pointsdf.")
-@click.option("--weights", type=click.Path(path_type=Path), help="Of pointsdf.")
+@click.option("--weights", type=click.Path(path_type=Path), help="Of pointsdf. [its own]")
 @click.option("--gripper", default=HAND, show_default=True)
 @click.option("--friction", default=GraspConfig.friction, show_default=True, help="Of both.")
 @click.option("--first", type=click.IntRange(1), help="Scenes of each set.")
@@ -88,7 +88,7 @@ def main(
         click.echo(report(_rows(report_of), DRIFT))
         return
     chosen = tuple(name.strip() for name in methods.split(","))
-    known = METHODS if weights is None else (*METHODS, POINTSDF)
+    known = (*METHODS, POINTSDF)
     if output is None or not sets or set(chosen) - set(known):
         raise click.UsageError(f"name sets, -o FILE, and --methods of {', '.join(known)}")
     film = None if film_of is None else Film()

@@ -47,15 +47,13 @@ def methods_help(names: Sequence[str]) -> str:
 def weights_help() -> str:
     """Which methods `--weights` is for."""
     trained = [name for name, method in METHODS.items() if method.uses_weights]
-    return f"What {' or '.join(trained)} was trained to."
+    return f"What {' or '.join(trained)} was trained to. [default: what comes with brrp]"
 
 
 def check_weights(methods: Sequence[str], weights: Sequence[Path]) -> None:
-    """UsageError unless weights are given where a method was trained, and only there; WeightsError
-    for a file that cannot be used."""
+    """UsageError where weights are given and no method was trained; WeightsError for a file that
+    cannot be used."""
     trained = [name for name in methods if METHODS[name].uses_weights]
-    if trained and not weights:
-        raise click.UsageError(f"--method {trained[0]} needs --weights FILE")
     if weights and not trained:
         raise click.UsageError(
             f"--weights means nothing to --method {','.join(methods)}, so leave it out"

@@ -184,7 +184,7 @@ def command(
       brrp reconstruct --color c.png --depth d.png --intrinsics k.json --view
       brrp reconstruct frame.npz --prior prior/ --preset paper -o out/ --seed 1
       brrp reconstruct frame.npz --method vprism
-      brrp reconstruct frame.npz --method pointsdf --weights prior.safetensors
+      brrp reconstruct frame.npz --method pointsdf
       brrp reconstruct frame.npz --collision coacd --confidence 0.95
       brrp reconstruct frame.npz --grasp --gripper robotiq-2f-85
       brrp reconstruct frame.npz --prior prior/ --poses bop
@@ -232,8 +232,9 @@ def command(
     if prior is not None and k is not None and k > len(prior.names):
         note(f"--k {k}: the prior holds {len(prior.names)} objects, all of them are taken")
     if prior is None:
-        trained = "" if weights is None else f", weights {weights}"
-        note(f"Method: {method}, without a prior{trained}")
+        own = chosen.own_weights
+        used = weights or (own and f"{own.stem} (what comes with brrp)")
+        note(f"Method: {method}, without a prior" + (f", weights {used}" if used else ""))
     # Who asks for one frame has no use for them.
     helpers = started_later(chosen, workers, 0 if frames is None else None)
     given: dict[str, Any] = {

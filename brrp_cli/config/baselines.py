@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from brrp_cli.config.observation import ObservationConfig
+from brrp_cli.config.observation import ObservationConfig, StrayConfig
 from brrp_cli.config.ranges import share
 from brrp_cli.config.surface import SurfaceConfig
 
@@ -29,6 +29,8 @@ class PointSDFConfig:
     """The PointSDF baseline: what is asked of a trained network.
 
     surface : its level is the paper's; observation : only what finds the support plane
+    strays : what is left out of each mask: one pixel far behind moves the box that a cloud is
+    centred on
     half_width : of the box around the middle of what was seen outside of which occupancy is 0
     largest_deviation : metres; no surface is less certain than this; difference_step : metres, of
     difference quotients across the surface
@@ -38,6 +40,7 @@ class PointSDFConfig:
         default_factory=lambda: SurfaceConfig(level=0.3, one_piece=False)
     )
     observation: ObservationConfig = field(default_factory=ObservationConfig)
+    strays: StrayConfig = field(default_factory=StrayConfig)
     min_points: int = 16
     half_width: float = 0.2
     grid: CoarseToFineConfig = field(default_factory=CoarseToFineConfig)

@@ -123,7 +123,8 @@ def _reconstruct(
             device=plan.device if method.uses_cuda else "cpu",
             prior=prior,
             retriever=retriever,
-            weights=None if variant.weights is None else plan.weights[variant.weights],
+            # A method's own are where it is.
+            weights=plan.weights.get(variant.weights) if variant.weights else None,
             # Scenes are shared out among processes.
             workers=1,
         )

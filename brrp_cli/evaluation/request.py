@@ -7,7 +7,7 @@ import os
 import platform
 import shlex
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -88,8 +88,8 @@ def evaluate(request: Request, say: Callable[[str], None] = lambda text: None) -
     scenes = find_scenes(request.scenes, request.selection)
     opened = _prior(request)
     prior = None if opened is None else {"path": str(opened.path), "digest": opened.digest}
-    training = described_weights(request)
-    weights = named_weights(request.weights)
+    weights = named_weights(request)
+    training = described_weights(request.methods, weights)
     variants = expand(
         request.methods,
         request.presets,
@@ -102,7 +102,7 @@ def evaluate(request: Request, say: Callable[[str], None] = lambda text: None) -
     _check_prior(opened, variants)
     if any(variant.retriever in USE_CLIP for variant in variants):
         _prepare_clip(opened, need_clip_folder(request.clip_dir))
-    parameters = _parameters(request, scenes, variants, prior)
+    parameters = _parameters(request, scenes, variants, prior, weights)
     data_root = request.data_root or find_data_root(scenes, request.scenes)
     if opened is not None:
         scenes, matched = match_names(scenes, data_root, opened.manifest.objects)
@@ -126,7 +126,7 @@ def evaluate(request: Request, say: Callable[[str], None] = lambda text: None) -
         seed=request.seed,
         device=request.device,
         pictures=request.output / "pictures" if request.pictures else None,
-        weights=weights,
+        weights=weights if request.weights else {},
     )
     with (
         open_executor(request.workers, request.scheduler) as executor,
@@ -156,7 +156,7 @@ def evaluate(request: Request, say: Callable[[str], None] = lambda text: None) -
         about = {
             **parameters,
             "prior": prior,
-            "trained": {name: training[path] for name, path in weights.items()},
+            "trained": training,
             "command": shlex.join(["brrp", *sys.argv[1:]]),
             "machine": machine(),
             "bootstrap_rounds": ROUNDS,
@@ -171,24 +171,28 @@ def evaluate(request: Request, say: Callable[[str], None] = lambda text: None) -
     return Result(summaries, labels, lost, files)
 
 
-def described_weights(request: Request) -> dict[Path, dict[str, Any]]:
+def described_weights(
+    methods: Sequence[str], weights: Mapping[str, Path]
+) -> dict[str, dict[str, Any]]:
     """What each file says of its training. Errors: WeightsError for one that cannot be used."""
-    describers = (METHODS[name].describe_weights for name in request.methods if name in METHODS)
+    describers = (METHODS[name].describe_weights for name in methods if name in METHODS)
     return {
-        path: describe(path)
+        name: describe(path)
         for describe in describers
         if describe is not None
-        for path in request.weights
+        for name, path in weights.items()
     }
 
 
-def named_weights(paths: Sequence[Path]) -> dict[str, Path]:
-    """Weights by the names of their files, which stand for them in tables.
+def named_weights(request: Request) -> dict[str, Path]:
+    """Weights by the names of their files, which stand for them in tables: those that are given,
+    else those that the methods bring.
 
     Errors: WeightsError for two of one name.
     """
+    own = (METHODS[name].own_weights for name in request.methods if name in METHODS)
     found: dict[str, Path] = {}
-    for path in paths:
+    for path in request.weights or [path for path in own if path is not None]:
         if path.stem in found:
             raise WeightsError(
                 "Two files of weights have one name",
@@ -264,6 +268,7 @@ def _parameters(
     scenes: Sequence[Scene],
     variants: Sequence[Variant],
     prior: dict[str, str] | None,
+    weights: Mapping[str, Path],
 ) -> dict[str, Any]:
     """What decides the rows."""
     clip = clip_folder(request.clip_dir)
@@ -278,16 +283,16 @@ def _parameters(
         "prior_digest": None if prior is None else prior["digest"],
         "clip": str(clip) if uses_clip else None,
         "tables": {file: sha256_file(Path(file)) for file in sorted(files)},
-        **_weights_digests(request),
+        **_weights_digests(weights),
         "noise": request.noise,
         "seed": request.seed,
         "variants": {variant.label: variant.configuration for variant in variants},
     }
 
 
-def _weights_digests(request: Request) -> dict[str, Any]:
+def _weights_digests(weights: Mapping[str, Path]) -> dict[str, Any]:
     """Nothing where there are none, so that runs without weights stay what they were."""
-    digests = {path.stem: sha256_file(path) for path in request.weights}
+    digests = {name: sha256_file(path) for name, path in weights.items()}
     return {"weights": digests} if digests else {}
 
 

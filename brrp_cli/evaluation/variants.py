@@ -89,8 +89,8 @@ def expand(
 
     No preset is each method's first; of those given a method runs the ones that it has, and one
     that has but one preset runs it in any case. No k is the presets' own. Errors: BrrpError for an
-    unknown method, for one that has none of several presets, and for one that was trained without
-    the name of any weights.
+    unknown method and for one that has none of several presets. `weights` names those of a method
+    that was trained.
     """
     for name in methods:
         if name not in METHODS:
@@ -98,8 +98,6 @@ def expand(
     found: list[Variant] = []
     for name, shift in product(methods, shifts):
         method = METHODS[name]
-        if method.uses_weights and not weights:
-            raise BrrpError(f"{name} needs trained weights", fix="pass --weights FILE")
         found += [
             Variant(name, preset, k, retriever, trained, shift, config)
             for preset, config in _configurations(method, presets, files)

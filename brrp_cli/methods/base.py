@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from brrp_cli.config.registration import TrialConfig
 from brrp_cli.config.tracking import SharpenConfig
-from brrp_cli.errors import BrrpError, PriorError, WeightsError
+from brrp_cli.errors import BrrpError, PriorError
 from brrp_cli.methods.configuration import MethodConfig
 
 if TYPE_CHECKING:
@@ -72,7 +72,8 @@ class Setup:
     """What a method may need besides the frame.
 
     config : one of its presets, or a changed one; device : "auto", "cpu" or "cuda"
-    prior, retriever, weights : only where the method uses them
+    prior, retriever : only where the method uses them
+    weights : others than the method's own, of a method that was trained
     workers : objects at a time; None = as many as there are cores. Results do not depend on it
     helpers : processes that do some of the objects, for a method that `takes_helpers`
     only : the ids that are asked for, for a method that works `object_by_object`; None = all
@@ -110,6 +111,8 @@ class Method:
     check_prior : PriorError unless it can work with that prior, before any work is done
     describe_weights : reads what a file of weights says of its training; None for a method that
         is not trained. Errors: WeightsError
+    own_weights : what it was trained to as it is installed, and uses where no others are given;
+        None for a method that is not trained
     try_masks : which stored objects lie in each of other masks, without their shapes; None for a
         method that weighs no placements
     takes_helpers : whether it lets other processes do some of the objects
@@ -126,6 +129,7 @@ class Method:
     uses_retriever: bool = False
     check_prior: Callable[[Prior, Any], None] | None = None
     describe_weights: Callable[[Path], dict[str, Any]] | None = None
+    own_weights: Path | None = None
     uses_cuda: bool = False
     try_masks: Callable[[Frame, Setup, Trial], list[ObjectReconstruction]] | None = None
     takes_helpers: bool = False
@@ -140,8 +144,7 @@ class Method:
     @property
     def needs(self) -> str:
         """What it needs besides the frame, in words."""
-        needed = {"a prior": self.uses_prior, "trained weights": self.uses_weights}
-        return " and ".join(what for what, true in needed.items() if true) or "nothing but a frame"
+        return "a prior" if self.uses_prior else "nothing but a frame"
 
     def preset(self, name: str | None = None) -> Any:
         """The configuration of that name; the first one without a name. Errors: BrrpError."""
@@ -160,7 +163,7 @@ class Method:
     def check(self, setup: Setup) -> None:
         """What is lacking, or given in vain, is told before any work is done.
 
-        Errors: BrrpError; PriorError for a prior that is missing or does not suit, WeightsError.
+        Errors: BrrpError; PriorError for a prior that is missing or does not suit.
         """
         kind = type(self.preset())
         if not isinstance(setup.config, kind):
@@ -178,11 +181,6 @@ class Method:
             raise BrrpError(f"{self.name} uses no prior", found="a prior", fix="leave it out")
         if not self.uses_retriever and setup.retriever is not None:
             raise self.takes_no_retriever()
-        if self.uses_weights and setup.weights is None:
-            raise WeightsError(
-                f"{self.name} needs trained weights",
-                fix="pass the file of them: --weights FILE, or weights=FILE in Python",
-            )
         if not self.uses_weights and setup.weights is not None:
             raise BrrpError(f"{self.name} was not trained", found="weights", fix="leave them out")
         if self.check_prior is not None and setup.prior is not None:

@@ -20,7 +20,7 @@ from grasp_trial.bodies import TrueBody
 
 DEFAULT, MEAN, VPRISM, SEEN, TRUTH = "default", "mean mesh", "vprism", "seen hull", "true mesh"
 METHODS = (DEFAULT, MEAN, VPRISM, SEEN, TRUTH)
-# Only where weights are given.
+# Only where it is asked for.
 POINTSDF = "pointsdf"
 # Fewer points have no hull worth the name.
 FEWEST = 16

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from brrp_cli.config import PointSDFConfig
 from brrp_cli.methods.base import Method, Setup
-from brrp_cli.methods.pointsdf.weights import describe_weights
+from brrp_cli.methods.pointsdf.weights import OWN_WEIGHTS, describe_weights
 
 if TYPE_CHECKING:
     from brrp_cli.frames.frame import Frame
@@ -32,5 +32,6 @@ METHOD = Method(
     run=_run,
     posteriors=_posteriors,
     describe_weights=describe_weights,
+    own_weights=OWN_WEIGHTS,
     uses_cuda=True,
 )

@@ -28,8 +28,9 @@ from brrp_cli.methods.configuration import as_record
 from brrp_cli.methods.each_object import with_surface
 from brrp_cli.methods.pointsdf.decoder_file import read_decoder, write_decoder
 from brrp_cli.methods.pointsdf.farthest_points import farthest_points
-from brrp_cli.methods.pointsdf.weights import Weights, load_weights
+from brrp_cli.methods.pointsdf.weights import OWN_WEIGHTS, Weights, load_weights
 from brrp_cli.observation.ray_samples import box_center
+from brrp_cli.observation.strays import without_strays
 from brrp_cli.observation.support_plane import Plane, fit_plane
 from brrp_cli.progress import progress
 from brrp_cli.reconstruction import (
@@ -154,11 +155,13 @@ class PointSDFPosterior:
 def run(frame: Frame, setup: Setup) -> Reconstruction:
     """Every object of the frame; nothing is drawn but the plane's candidates."""
     config = setup.config
-    assert isinstance(config, PointSDFConfig) and setup.weights is not None
+    assert isinstance(config, PointSDFConfig)
+    weights = setup.weights or OWN_WEIGHTS
     device = pick_device(setup.device)
-    digest = sha256_file(setup.weights)
-    loaded = _loaded(setup.weights, digest, device)
-    found = reconstruct_pointsdf(frame, loaded.network, config)
+    digest = sha256_file(weights)
+    loaded = _loaded(weights, digest, device)
+    cleaned = without_strays(frame, config.strays)
+    found = reconstruct_pointsdf(cleaned, loaded.network, config)
     return Reconstruction(
         frame=frame,
         objects=[
@@ -174,7 +177,7 @@ def run(frame: Frame, setup: Setup) -> Reconstruction:
             **as_record(config),
             "network": asdict(loaded.network.config),
             "weights": {
-                "path": str(setup.weights),
+                "path": str(weights),
                 "sha256": digest,
                 "training": loaded.training,
             },

@@ -19,6 +19,8 @@ if TYPE_CHECKING:
     from brrp_cli.methods.pointsdf.network import NetworkConfig, PointSDF
 
 FORMAT = "brrp pointsdf 1"
+# What comes with the package; docs/pointsdf.md tells what it was trained on.
+OWN_WEIGHTS = Path(__file__).with_name("tabletop.safetensors")
 _FIX = "pass --weights FILE with a file that tools/train_pointsdf.py wrote"
 
 

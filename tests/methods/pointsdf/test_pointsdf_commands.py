@@ -13,7 +13,7 @@ from eight_objects import MESHES
 
 from brrp_cli import load_frame, reconstruct
 from brrp_cli.cli import main
-from brrp_cli.errors import BrrpError, WeightsError
+from brrp_cli.errors import BrrpError
 from brrp_cli.frames.npz import save_frame
 from brrp_cli.methods.pointsdf.weights import load_weights, save_weights
 
@@ -68,7 +68,6 @@ def test_the_record_says_what_was_trained(out, trained):
 @pytest.mark.parametrize(
     ("options", "said"),
     [
-        (["--method", "pointsdf"], "needs --weights"),
         (["--weights", "w.safetensors"], "means nothing to --method brrp"),
         (["--method", "pointsdf", "--weights", "none.safetensors"], "no weights there"),
         (["--method", "pointsdf", "--weights", "W", "--k", "3"], "leave out --k"),
@@ -84,8 +83,6 @@ def test_what_does_not_fit_is_refused_before_the_work(trained, tmp_path, options
 
 def test_python_refuses_what_does_not_fit(trained):
     frame = load_frame(trained.folder / "scenes" / "0.npz")
-    with pytest.raises(WeightsError, match="needs trained weights"):
-        reconstruct(frame, method="pointsdf")
     with pytest.raises(BrrpError, match="vprism was not trained"):
         reconstruct(frame, method="vprism", weights=trained.weights)
 
@@ -164,5 +161,16 @@ def test_two_weights_of_one_name_are_refused(trained, tmp_path):
     command = ["eval", trained.folder / "scenes", "--method", "pointsdf", "-o", tmp_path / "out"]
     result = run(*command, "--weights", trained.weights, "--weights", twin)
     assert result.exit_code == 1 and "one name" in result.output
-    result = run(*command)
-    assert result.exit_code == 2 and "needs --weights" in result.output
+
+
+def test_an_evaluation_without_weights_takes_the_methods_own(trained, tmp_path):
+    write_two(trained, tmp_path / "scenes")
+    command = ["eval", tmp_path / "scenes", "--data-root", trained.folder, "--method", "pointsdf"]
+    result = run(*command, "-o", tmp_path / "out", "--workers", "1")
+    assert result.exit_code == 0, result.output
+    with (tmp_path / "out" / "metrics.csv").open(newline="") as stream:
+        rows = list(csv.DictReader(stream))
+    assert [row["status"] for row in rows] == ["ok", "ok"]
+    assert {row["weights"] for row in rows} == {"tabletop"}
+    told = json.loads((tmp_path / "out" / "summary.json").read_text())
+    assert told["trained"]["tabletop"]["scenes"] == 300
