@@ -123,7 +123,7 @@ def _reconstruct(
             device=plan.device if method.uses_cuda else "cpu",
             prior=prior,
             retriever=retriever,
-            # A method's own are where it is.
+            # Those that the method brings are not in the plan.
             weights=plan.weights.get(variant.weights) if variant.weights else None,
             # Scenes are shared out among processes.
             workers=1,

@@ -45,10 +45,10 @@ def test_grasps_of_a_block_hold_and_methods_may_come_later(tmp_path, monkeypatch
     least = np.exp(-0.15 * GRAVITY * 0.03 / GraspConfig.torque)
     assert all(row["result"] == "held" and least < row["score"] <= 1 for row in first)
     assert "| true mesh | made | 100%, 3 | 100%, 1 | 100%, 1 |" in told
-    run("true mesh,seen hull")
+    run("true mesh,seen hull,pointsdf")
     assert rows_of(output)[:3] == first
-    assert {row["method"] for row in rows_of(output)[3:]} == {"seen hull"}
-    # Without weights there is no PointSDF.
-    given = ["made=scenes", "--methods", "pointsdf", "-o", str(output)]
+    # PointSDF has weights of its own.
+    assert {row["method"] for row in rows_of(output)[3:]} == {"seen hull", "pointsdf"}
+    given = ["made=scenes", "--methods", "pointnet", "-o", str(output)]
     refused = CliRunner().invoke(grasp_experiment.main, given)
     assert refused.exit_code == 2 and "--methods of default" in refused.output
