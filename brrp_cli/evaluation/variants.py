@@ -90,19 +90,20 @@ def expand(
     No preset is each method's first; of those given a method runs the ones that it has, and one
     that has but one preset runs it in any case. No k is the presets' own. Errors: BrrpError for an
     unknown method and for one that has none of several presets. `weights` names those of a method
-    that was trained.
+    that was trained; none, and it runs once, with its own.
     """
     for name in methods:
         if name not in METHODS:
             raise BrrpError("No such method", found=name, expected=", ".join(METHODS))
     found: list[Variant] = []
+    named: list[str | None] = [*weights] or [None]
     for name, shift in product(methods, shifts):
         method = METHODS[name]
         found += [
             Variant(name, preset, k, retriever, trained, shift, config)
             for preset, config in _configurations(method, presets, files)
             for retriever in (retrievers if method.uses_retriever else [None])
-            for trained in (weights if method.uses_weights else [None])
+            for trained in (named if method.uses_weights else [None])
             for k in _ks(method.preset(preset) if config is None else config, ks)
         ]
     return list(dict.fromkeys(found))

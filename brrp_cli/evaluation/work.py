@@ -14,7 +14,10 @@ from brrp_cli.reconstruction import FAILED
 
 @dataclass(frozen=True)
 class Plan:
-    """Everything that a worker has to know."""
+    """Everything that a worker has to know.
+
+    weights : files by name, of those that are given; a method finds its own by itself
+    """
 
     scenes: list[Scene]
     variants: list[Variant]

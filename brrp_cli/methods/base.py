@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from brrp_cli.config.registration import TrialConfig
 from brrp_cli.config.tracking import SharpenConfig
-from brrp_cli.errors import BrrpError, PriorError
+from brrp_cli.errors import BrrpError, PriorError, WeightsError
 from brrp_cli.methods.configuration import MethodConfig
 
 if TYPE_CHECKING:
@@ -112,7 +112,7 @@ class Method:
     describe_weights : reads what a file of weights says of its training; None for a method that
         is not trained. Errors: WeightsError
     own_weights : what it was trained to as it is installed, and uses where no others are given;
-        None for a method that is not trained
+        None for a method that is not trained, or brings none
     try_masks : which stored objects lie in each of other masks, without their shapes; None for a
         method that weighs no placements
     takes_helpers : whether it lets other processes do some of the objects
@@ -163,7 +163,7 @@ class Method:
     def check(self, setup: Setup) -> None:
         """What is lacking, or given in vain, is told before any work is done.
 
-        Errors: BrrpError; PriorError for a prior that is missing or does not suit.
+        Errors: BrrpError; PriorError for a prior that is missing or does not suit, WeightsError.
         """
         kind = type(self.preset())
         if not isinstance(setup.config, kind):
@@ -181,6 +181,11 @@ class Method:
             raise BrrpError(f"{self.name} uses no prior", found="a prior", fix="leave it out")
         if not self.uses_retriever and setup.retriever is not None:
             raise self.takes_no_retriever()
+        if self.uses_weights and not (setup.weights or self.own_weights):
+            raise WeightsError(
+                f"{self.name} needs trained weights",
+                fix="pass the file of them: --weights FILE, or weights=FILE in Python",
+            )
         if not self.uses_weights and setup.weights is not None:
             raise BrrpError(f"{self.name} was not trained", found="weights", fix="leave them out")
         if self.check_prior is not None and setup.prior is not None:

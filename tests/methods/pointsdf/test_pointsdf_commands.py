@@ -13,9 +13,11 @@ from eight_objects import MESHES
 
 from brrp_cli import load_frame, reconstruct
 from brrp_cli.cli import main
-from brrp_cli.errors import BrrpError
+from brrp_cli.errors import BrrpError, WeightsError
+from brrp_cli.evaluation.variants import expand
 from brrp_cli.frames.npz import save_frame
 from brrp_cli.methods.pointsdf.weights import load_weights, save_weights
+from brrp_cli.methods.registry import METHODS
 
 TWO = [4, 8]
 
@@ -85,6 +87,14 @@ def test_python_refuses_what_does_not_fit(trained):
     frame = load_frame(trained.folder / "scenes" / "0.npz")
     with pytest.raises(BrrpError, match="vprism was not trained"):
         reconstruct(frame, method="vprism", weights=trained.weights)
+
+
+def test_a_trained_method_that_brings_no_weights_needs_some(trained, monkeypatch):
+    monkeypatch.setitem(METHODS, "pointsdf", replace(METHODS["pointsdf"], own_weights=None))
+    frame = load_frame(trained.folder / "scenes" / "0.npz")
+    with pytest.raises(WeightsError, match="needs trained weights"):
+        reconstruct(frame, method="pointsdf")
+    assert [each.weights for each in expand(["pointsdf"], [], [], [], [0])] == [None]
 
 
 def write_two(trained, folder):
