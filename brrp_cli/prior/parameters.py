@@ -30,9 +30,14 @@ class SampleMix:
 
 @dataclass(frozen=True)
 class PoseConfig:
-    """Which resting poses are kept."""
+    """Which resting poses are kept.
+
+    hull_faces : at most, of the hull that an object rests on; tolerance : by how much that hull may
+        lie off at first, times the diagonal of the object's box
+    """
 
     hull_faces: int = 400
+    tolerance: float = 1e-4
     merge_degrees: float = 10.0
     min_probability: float = 0.01
     max_count: int = 12

@@ -5,13 +5,18 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
-from brrp_cli.dependencies import import_open3d
+from brrp_cli.errors import MeshError
 from brrp_cli.prior.objects import RestingPose
 from brrp_cli.prior.parameters import PoseConfig
 
 if TYPE_CHECKING:
     import trimesh
+
+# Times the tolerance, until all ways to fall are accounted for.
+TOLERANCES = 1.5 ** np.arange(24)
+COMPLETE = 0.999
 
 
 def resting_poses(mesh: trimesh.Trimesh, config: PoseConfig) -> list[RestingPose]:
@@ -21,14 +26,7 @@ def resting_poses(mesh: trimesh.Trimesh, config: PoseConfig) -> list[RestingPose
     are counted to it: the many facets of a scanned bottom are one pose, and those of a can's side
     a dozen.
     """
-    import trimesh
-
-    hull = mesh.convex_hull
-    if len(hull.faces) > config.hull_faces:
-        hull = _coarser_hull(hull, config.hull_faces)
-    transforms, probabilities = trimesh.poses.compute_stable_poses(
-        hull, center_mass=mesh.center_mass, seed=0
-    )
+    transforms, probabilities = _stable_poses(mesh, config)
     # The mesh's direction that points down: the resting face's normal.
     down = -transforms[:, 2, :3]
     cosine = np.cos(np.radians(config.merge_degrees))
@@ -47,13 +45,35 @@ def resting_poses(mesh: trimesh.Trimesh, config: PoseConfig) -> list[RestingPose
     return (kept or poses[:1])[: config.max_count]
 
 
-def _coarser_hull(hull: trimesh.Trimesh, faces: int) -> trimesh.Trimesh:
+def _stable_poses(
+    mesh: trimesh.Trimesh, config: PoseConfig
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """T_plane_object (n, 4, 4) of the faces of the hull that the mesh rests on, and their
+    probabilities (n,).
+
+    trimesh sums solid angles of faces, which are NaN for slivers; whatever rolls over one is lost.
+    So the hull loses what bends by less than a tolerance, which grows until nothing is lost.
+    """
+    import manifold3d
     import trimesh
 
-    o3d = import_open3d()
-    fine = o3d.geometry.TriangleMesh(
-        o3d.utility.Vector3dVector(np.asarray(hull.vertices)),
-        o3d.utility.Vector3iVector(np.asarray(hull.faces, dtype=np.int32)),
-    )
-    coarse = fine.simplify_quadric_decimation(target_number_of_triangles=faces)
-    return trimesh.convex.convex_hull(np.asarray(coarse.vertices))
+    hull = manifold3d.Manifold.hull_points(np.asarray(mesh.vertices))
+    best, most = (np.empty((0, 4, 4)), np.empty(0)), 0.0
+    for tolerance in mesh.scale * config.tolerance * TOLERANCES:
+        simpler = hull.simplify(tolerance)
+        if simpler.is_empty():
+            break
+        if simpler.num_tri() > config.hull_faces:
+            continue
+        corners = simpler.to_mesh64().vert_properties[:, :3]
+        with np.errstate(invalid="ignore"):
+            found = trimesh.poses.compute_stable_poses(
+                trimesh.convex.convex_hull(corners), center_mass=mesh.center_mass, seed=0
+            )
+        if (total := float(found[1].sum())) > most:
+            best, most = found, total
+        if most > COMPLETE:
+            break
+    if not most:
+        raise MeshError("The mesh rests on no face of its hull", found=f"{len(mesh.faces)} faces")
+    return best

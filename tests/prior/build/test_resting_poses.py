@@ -41,3 +41,18 @@ def test_a_ball_has_at_least_one_pose_and_all_its_points_above_the_plane() -> No
     assert len(poses) == 1
     lowest = transform_points(poses[0].T_plane_object, ball.vertices)[:, 2].min()
     assert lowest == pytest.approx(0.0, abs=1e-9)
+
+
+def test_what_rests_on_many_slivers_loses_no_pose() -> None:
+    # Faces cut into many leave rounded vertices a hair beside one another on the hull.
+    box = trimesh.creation.box((0.2, 0.05, 0.01))
+    for _ in range(5):
+        box = box.subdivide()
+    box.apply_transform(trimesh.transformations.rotation_matrix(0.3, [1, 2, 3]))
+    box.vertices = box.vertices.astype(np.float32).astype(np.float64)
+    of_many = resting_poses(box, PoseConfig())
+    of_twelve = resting_poses(box.convex_hull.bounding_box_oriented, PoseConfig())
+    assert [pose.probability for pose in of_many] == pytest.approx(
+        [pose.probability for pose in of_twelve], abs=1e-3
+    )
+    assert sum(pose.probability for pose in of_many) == pytest.approx(1.0, abs=0.01)
