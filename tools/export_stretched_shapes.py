@@ -18,6 +18,7 @@ from tqdm import tqdm
 # The script also runs from a checkout that is not installed.
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
+from drawn.stretched import draw_stretch
 from tabletop.held_out import LEAVE, MIXED, TAKE, chosen
 from tabletop.models import find_meshes
 from tabletop.names_option import prefixes
@@ -28,9 +29,6 @@ from brrp_cli.files import write_bytes
 from brrp_cli.ground_truth.truth import TrueObject, true_mesh
 from brrp_cli.prior.build.repair import repair
 from brrp_cli.seeds import child_rng
-
-# Standard deviations of logarithms: of the size, and of the length along each axis.
-SIZE, AXIS = 0.15, 0.2
 
 
 @click.command()
@@ -57,7 +55,7 @@ def main(
             for copy in range(1, copies + 1):
                 rng = child_rng(seed, "stretched", true.name, copy)
                 mesh = solid.copy()
-                mesh.apply_scale(np.exp(rng.normal(0, SIZE) + rng.normal(0, AXIS, 3)))
+                mesh.apply_scale(draw_stretch(rng))
                 name = f"{true.name}{STRETCHED}{copy}.ply"
                 write_bytes(output / name, mesh.export(file_type="ply"))
     except BrrpError as error:
