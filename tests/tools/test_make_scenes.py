@@ -60,6 +60,21 @@ def test_plain_colours_of_faces_are_drawn(tmp_path):
     assert load_model(tmp_path / "none.stl").uv is None
 
 
+def test_as_many_colours_are_drawn_as_vertices_have(tmp_path):
+    ball = trimesh.creation.icosphere(subdivisions=4, radius=0.05)
+    places = ball.vertices / 0.1 + 0.5
+    ball.visual.vertex_colors = np.c_[255 * places, np.full(len(places), 255)].astype(np.uint8)
+    ball.export(tmp_path / "ball.ply")
+    model = load_model(tmp_path / "ball.ply")
+    texture = np.asarray(model.texture)
+    corners = model.uv[model.faces].mean(axis=1)
+    column = (corners[:, 0] * texture.shape[1]).astype(int)
+    row = ((1 - corners[:, 1]) * texture.shape[0]).astype(int)
+    middles = model.vertices[model.faces].mean(axis=1) / 0.1 + 0.5
+    assert len(np.unique(texture[row, column], axis=0)) > 2000
+    np.testing.assert_allclose(texture[row, column], 255 * middles, atol=8)
+
+
 def generate(data, output, *options):
     arguments = ["--meshes", data / "meshes", "--size", SIZE, "-o", output, *options]
     return CliRunner().invoke(main, [str(a) for a in arguments])

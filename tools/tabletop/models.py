@@ -16,7 +16,7 @@ from brrp_cli.errors import MeshError
 SUFFIXES = {".obj", ".ply", ".stl", ".off", ".glb"}
 MAX_VERTICES = 131_072  # of one shape in PyBullet
 TEXTURE_SIZE = 1024
-MAX_COLOURS, SQUARE = 512, 8  # plain colours of a mesh; pixels of each in its texture
+COLUMNS, SQUARE = 512, 8  # of plain colours in the texture of a mesh; pixels of each
 DENSITY = 400.0  # kg/m3; between an empty box and a full can
 
 
@@ -120,7 +120,7 @@ def _texture(mesh: Any) -> tuple[NDArray[np.float64] | None, Any]:
 
 def _plain_colours(path: Path) -> tuple[Any, NDArray[np.float64], Any] | None:
     """The mesh with corners of their own for each face, their uv, and a texture with a square for
-    each colour, of a file whose faces have plain colours; None for a file without."""
+    each colour, of a file whose faces or vertices have colours; None for a file without."""
     import trimesh
     from PIL import Image
 
@@ -132,13 +132,18 @@ def _plain_colours(path: Path) -> tuple[Any, NDArray[np.float64], Any] | None:
     colours = np.concatenate([paint.corners.mean(axis=1) for _, paint in parts])
     palette, which = np.unique(np.rint(colours).astype(np.uint8), axis=0, return_inverse=True)
     corners = np.concatenate([part.triangles.reshape(-1, 3) for part, _ in parts])
-    if len(palette) > MAX_COLOURS or len(corners) > MAX_VERTICES:
+    if len(corners) > MAX_VERTICES:
         return None
     normals = np.concatenate([part.vertex_normals[part.faces].reshape(-1, 3) for part, _ in parts])
     mesh = trimesh.Trimesh(
         corners, np.arange(len(corners)).reshape(-1, 3), vertex_normals=normals, process=False
     )
-    squares = np.repeat(np.repeat(palette[None], SQUARE, axis=0), SQUARE, axis=1)
-    across = (np.repeat(which.ravel(), 3) + 0.5) / len(palette)
-    uv = np.stack([across, np.full(len(across), 0.5)], axis=1)
-    return mesh, uv, Image.fromarray(squares)
+    columns = min(len(palette), COLUMNS)
+    rows = -(-len(palette) // columns)
+    squares = np.zeros((rows * columns, 3), dtype=np.uint8)
+    squares[: len(palette)] = palette
+    squares = squares.reshape(rows, columns, 3).repeat(SQUARE, axis=0).repeat(SQUARE, axis=1)
+    row, column = np.divmod(which.ravel(), columns)
+    # v = 0 is the lower edge of a texture.
+    uv = np.stack([(column + 0.5) / columns, 1 - (row + 0.5) / rows], axis=1)
+    return mesh, uv.repeat(3, axis=0), Image.fromarray(squares)
