@@ -5,11 +5,12 @@
     python tools/fit_appearance.py --prior prior/ --absent --report test_prior/
 
 Scenes of objects that the prior holds and of others, made with `tools/make_scenes.py --noise
-structured-light --light varied`; every view counts. What is minimised is the mean of -ln P(what it
-is | R), where what is not in the prior is one more class. With `--absent` every view counts once
-more with the true objects left out of the prior: strangers of the same kinds. Several `--prior` fit
-one set of constants to priors of different sizes. Printed are the values for
-FusionConfig in brrp_cli/config/retrieval.py, and what becomes of each set.
+structured-light --light varied` or `--sensor`; every view counts, with `--segment` once more with
+masks from depth. What is minimised is the mean of -ln P(what it is | R), where what is not in the
+prior is one more class. With `--absent` every view counts once more with the true objects left out
+of the prior: strangers of the same kinds. Several `--prior` fit one set of constants to priors of
+different sizes. Printed are the values for FusionConfig in brrp_cli/config/retrieval.py, and what
+becomes of each set.
 """
 
 from __future__ import annotations
@@ -30,6 +31,7 @@ from brrp_cli.config import preset
 from brrp_cli.config.retrieval import FusionConfig, IlluminantsConfig
 from brrp_cli.errors import BrrpError
 from brrp_cli.evaluation.calibration import expected_calibration_error
+from brrp_cli.frames.frame import Frame
 from brrp_cli.ground_truth.scenes import find_scenes
 from brrp_cli.prior.store import Prior, open_prior
 from brrp_cli.progress import progress
@@ -37,6 +39,7 @@ from brrp_cli.retrieval.appearance import AppearanceRetriever
 from brrp_cli.retrieval.base import unknown
 from brrp_cli.retrieval.illuminants import lights, local_lights, log_prior
 from brrp_cli.retrieval.score_fusion import Similarity, believe
+from brrp_cli.segmentation.segment import segment
 
 LARGE = 500  # visible pixels
 TAKEN = 0.5  # probability
@@ -57,22 +60,26 @@ class View:
 @click.command()
 @click.option("--prior", "priors", required=True, multiple=True, type=click.Path(path_type=Path))
 @click.option("--absent", is_flag=True, help="Also as strangers: left out of the prior.")
+@click.option("--segment", "segmented", is_flag=True, help="Masks from the frame alone, too.")
 @click.option("--report", is_flag=True, help="Fit nothing: report with the constants in the code.")
 @click.argument("sets", nargs=-1, required=True, type=click.Path(path_type=Path))
-def main(priors: tuple[Path, ...], absent: bool, report: bool, sets: tuple[Path, ...]) -> None:
+def main(
+    priors: tuple[Path, ...], absent: bool, segmented: bool, report: bool, sets: tuple[Path, ...]
+) -> None:
     """Fit on SETS, folders of scenes, and print constants and hit rates."""
     views = []
     try:
         for path in priors:
             prior = open_prior(path)
-            seen = [view for folder in sets for view in look(prior, folder, report)]
+            masks = (False, True) if segmented else (False,)
+            seen = [view for folder in sets for made in masks for view in look(prior, folder, made)]
             views += seen + ([left_out(view) for view in seen] if absent else [])
     except BrrpError as error:
         raise click.ClickException(str(error)) from error
-    fitted = None if report else fit(views)
+    in_use = preset("default").retrieval.fusion
+    weights = in_use if report else fit(views, in_use)
     for count in sorted({view.count for view in views}):
         members = [view for view in views if view.count == count]
-        weights = fitted or weights_of(count)
         click.echo(f"{count} objects: {weights}, mean loss {loss(members, weights):.4f}")
         click.echo(f"{count} objects: calibration error {calibration(members, weights):.3f}")
         for group in dict.fromkeys(view.group for view in members):
@@ -81,29 +88,21 @@ def main(priors: tuple[Path, ...], absent: bool, report: bool, sets: tuple[Path,
                 click.echo(f"{count}, {line(group, here, weights, large)}")
 
 
-def weights_of(count: int) -> FusionConfig:
-    """The constants in the code for a prior of that size."""
-    own = preset("default").retrieval
-    return own.fusion if count >= own.alignment.from_objects else own.likeness
-
-
-def look(prior: Prior, folder: Path, as_used: bool) -> list[View]:
-    """The evidence of all views of all scenes in a folder; with alignment for a prior of any size,
-    or `as_used`."""
-    config = preset("default")
-    if not as_used:
-        alignment = replace(config.retrieval.alignment, from_objects=1)
-        config = replace(config, retrieval=replace(config.retrieval, alignment=alignment))
-    retriever = AppearanceRetriever(prior, config, 0)
+def look(prior: Prior, folder: Path, segmented: bool) -> list[View]:
+    """The evidence of all views of all scenes in a folder; if `segmented`, of masks from depth,
+    each of the object that most of its pixels show."""
+    retriever = AppearanceRetriever(prior, preset("default"), 0)
     views = []
     for scene in progress(find_scenes(folder), folder.name):
         for index in range(len(scene.views)):
-            frame = scene.view(index)
+            given = scene.view(index)
+            frame = replace(given, segmap=segment(given)) if segmented else given
             found = retriever.evidence(frame)
-            names = [scene.object(i).name for i in found]
+            shown = [mostly(frame.segmap == i, given) for i in found]
+            names = [scene.object(i).name if i else "" for i in shown]
             views.append(
                 View(
-                    group=folder.name,
+                    group=folder.name + (", masks from depth" if segmented else ""),
                     count=len(prior.names),
                     evidence=list(found.values()),
                     pixels=[int(np.count_nonzero(frame.segmap == i)) for i in found],
@@ -111,6 +110,12 @@ def look(prior: Prior, folder: Path, as_used: bool) -> list[View]:
                 )
             )
     return views
+
+
+def mostly(mask: NDArray[np.bool_], frame: Frame) -> int:
+    """The object of the frame that most pixels with depth of a mask show; 0 = none."""
+    pixels = np.maximum(frame.segmap[mask & frame.valid], 0)
+    return int(np.bincount(pixels).argmax()) if len(pixels) else 0
 
 
 def left_out(view: View) -> View:
@@ -142,21 +147,21 @@ def without(item: Similarity, row: int) -> Similarity:
     )
 
 
-def fit(views: Sequence[View]) -> FusionConfig:
+def fit(views: Sequence[View], in_use: FusionConfig) -> FusionConfig:
     """The weights with the least loss, all of them positive; what depends on the sensor stays."""
     from scipy.optimize import minimize
 
-    begin = {k: v for k, v in asdict(FusionConfig()).items() if k not in ("usual", "wave")}
+    begin = {k: v for k, v in asdict(in_use).items() if k not in ("usual", "wave")}
 
     def weights(x: NDArray[np.float64]) -> FusionConfig:
         found = zip(begin, np.exp(x), strict=True)
-        return FusionConfig(**{name: round(float(value), 3) for name, value in found})
+        return replace(in_use, **{name: round(float(value), 3) for name, value in found})
 
     best = minimize(
         lambda x: loss(views, weights(x)),
         np.log(list(begin.values())),
-        method="Nelder-Mead",
-        options={"xatol": 1e-2, "fatol": 1e-4, "maxfev": 200},
+        method="Powell",
+        options={"xtol": 5e-2, "ftol": 1e-4, "maxfev": 400},
     )
     return weights(best.x)
 

@@ -12,7 +12,7 @@ of what is right, with a pull to the constants in use. Printed are values for Li
 brrp_cli/config/registration.py, and what becomes of each set.
 
 One line of OUTPUT for each mask; a second run goes on where the first was stopped, and may add
-masks of another prior: in one of 100 objects or more P(c|R) knows the depth, in a small one not.
+masks of another prior. P(c|R) of retrieval by appearance knows the depth, that of others may not.
 """
 
 from __future__ import annotations
@@ -43,6 +43,7 @@ from brrp_cli.registration.weigh import weigh
 
 FITTED = (
     "depth",
+    "known_depth",
     "misfit",
     "missed",
     "covered",
@@ -107,7 +108,7 @@ def main(
 
 def ratios(mask: Mask, config: LikelihoodConfig) -> NDArray[np.float64]:
     """Log likelihood ratios (C,), nats, of the placements of one mask."""
-    depth = 0.0 if mask.aligned else config.depth
+    depth = config.known_depth if mask.aligned else config.depth
     return np.array(
         [
             config.base

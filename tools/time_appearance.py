@@ -22,6 +22,8 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from brrp_cli.config import preset
 from brrp_cli.errors import BrrpError
 from brrp_cli.frames.readers import read_frame
+from brrp_cli.observation.ray_samples import scene_plane
+from brrp_cli.observation.strays import without_strays
 from brrp_cli.prior.store import open_prior
 from brrp_cli.retrieval.appearance import AppearanceRetriever
 from brrp_cli.retrieval.base import top_k
@@ -47,10 +49,12 @@ def main(prior_path: Path, frame_path: Path) -> None:
     except BrrpError as error:
         raise click.ClickException(str(error)) from error
     looks = prior.appearance
-    own = preset("default").retrieval
+    config = preset("default")
+    own = config.retrieval
     gains = lights(own.illuminants)
     shortlist = Shortlist(looks.first, own)
-    plane = retriever.plane(frame)
+    frame = without_strays(frame, config.strays)
+    plane = scene_plane(frame, config.observation, 0)
     # Not the imports that come with the first of them.
     see_object(frame, frame.object_ids[0], plane, own.observed)
     seconds = dict.fromkeys(("see", "light", "look up"), 0.0)

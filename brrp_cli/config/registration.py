@@ -303,8 +303,8 @@ class LikelihoodConfig:
     colour_spread : L*a*b*, by which those of one thing differ
     depth, misfit, missed, covered, free_space, unmasked, below, colour : nats for a nat of depth
     residuals, a standard deviation of misfit, a vote of missed, covered, free or unmasked pixels,
-    all of the surface below the table, full correlation of colours; `depth` counts nothing where
-    P(c|R) follows from how stored objects lie over the measured depth, which would count twice
+    all of the surface below the table, full correlation of colours; known_depth : in place of
+    `depth` where P(c|R) follows from how stored objects lie over the measured depth, too
     most_votes : that all votes can come to; base : nats of any placement
     other_size : nats against a placement at another size than the stored one
     within : placements whose alignment score is less than the best by more have no weight, nor have
@@ -329,7 +329,8 @@ class LikelihoodConfig:
     colours: int = 150
     colour_spread: float = 6.0
     depth: float = 2.7
-    misfit: float = 2.2
+    known_depth: float = 0.7
+    misfit: float = 3.2
     missed: float = 34.0
     covered: float = 0.95
     free_space: float = 20.7
@@ -337,7 +338,7 @@ class LikelihoodConfig:
     below: float = 49.0
     colour: float = 5.5
     most_votes: float = 1.03
-    base: float = between(1.3, -50.0, 50.0)
+    base: float = between(1.25, -50.0, 50.0)
     other_size: float = 3.6
     within: float = 0.5
     least_alignment: float = between(0.25, -1.0, 1.0)

@@ -25,10 +25,11 @@ class SeenFrom:
 
 
 def counted_once(config: HypothesesConfig, knows_depth: bool) -> HypothesesConfig:
-    """Without depth residuals where P(c|R) follows from depth already."""
+    """With less of depth residuals where P(c|R) follows from depth already."""
     if not knows_depth:
         return config
-    return replace(config, likelihood=replace(config.likelihood, depth=0.0))
+    likelihood = config.likelihood
+    return replace(config, likelihood=replace(likelihood, depth=likelihood.known_depth))
 
 
 def judged(

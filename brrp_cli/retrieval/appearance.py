@@ -35,12 +35,13 @@ class AppearanceRetriever:
     """P(c|R) from colour, shape and size.
 
     The objects of a frame are judged together, since one light falls on all of them: the first
-    question about a frame costs as much as all of its objects, the others cost nothing. `aligns`
-    tells whether objects are laid over what is seen, as they are in large priors.
+    question about a frame costs as much as all of its objects, the others cost nothing. Stored
+    objects are laid over what is seen, so that P(c|R) knows the depth: `aligns`.
     """
 
     name = "appearance"
     sendable = True
+    aligns = True
 
     def __init__(self, prior: Prior, config: Config, seed: int, steps: Steps | None = None) -> None:
         self._steps = steps or Steps(prior, config, seed)
@@ -60,11 +61,6 @@ class AppearanceRetriever:
         if self._seen is not None:
             seen = {key: found for key, found in self._seen.items() if not key[1]}
         return _received, (*self._made_of, self._steps, seen, self._table, self._hasty)
-
-    @property
-    def aligns(self) -> bool:
-        """See above."""
-        return self._steps.aligns
 
     @contextmanager
     def one_image(self) -> Iterator[None]:
@@ -98,9 +94,7 @@ class AppearanceRetriever:
         if frame is not self._frame:
             # Of masks that are tried, only the one that is asked about is looked at.
             found = self.evidence(frame, [object_id] if self._hasty else None)
-            own = self._made_of[1].retrieval
-            weights = own.fusion if self.aligns else own.likeness
-            answers = self._believe(list(found.values()), weights)
+            answers = self._believe(list(found.values()), self._made_of[1].retrieval.fusion)
             self._answers = dict(zip(found, answers, strict=True))
             self._frame = frame
         if object_id not in self._answers:
@@ -135,14 +129,12 @@ class AppearanceRetriever:
         image = SeenImage(self._steps, frame, plane, wave)
         found = self._each(looked, image, [(object_id,) for object_id in ids])
         looks = [look for look, _ in found]
-        if self.aligns:
-            likely = self._believe(looks, self._made_of[1].retrieval.likeness)
-            asked = [
-                (object_id, look, probabilities[look.rows], points, self._hasty)
-                for object_id, (look, points), probabilities in zip(ids, found, likely, strict=True)
-            ]
-            looks = self._each(aligned, image, asked)
-        return dict(zip(ids, looks, strict=True))
+        likely = self._believe(looks, self._made_of[1].retrieval.likeness)
+        asked = [
+            (object_id, look, probabilities[look.rows], points, self._hasty)
+            for object_id, (look, points), probabilities in zip(ids, found, likely, strict=True)
+        ]
+        return dict(zip(ids, self._each(aligned, image, asked), strict=True))
 
     def _believe(
         self, evidence: Sequence[Similarity], weights: FusionConfig
@@ -157,7 +149,7 @@ class AppearanceRetriever:
             return self._table
         _, config, seed = self._made_of
         plane, wave = scene_plane(frame, config.observation, seed), 0.0
-        if plane is not None and self.aligns:
+        if plane is not None:
             # The paper's preset has no numbers of its own for the sensor.
             hypotheses = config.hypotheses or HypothesesConfig()
             wave = wave_deviation(frame, plane, hypotheses.sensor)

@@ -44,10 +44,10 @@ class Rounds:
         self._config = config
         self._left = alike(likely, config.alignment.margin)
         looks = np.log(np.maximum(likely, np.finfo(float).tiny))
-        # With the weights that decide in the end.
-        self._counted = looks + looks_difference(look, config.likeness, config.fusion)
+        # With the weights that steer the rounds.
+        self._counted = looks + looks_difference(look, config.likeness, config.steering)
         self._shape = by_shape(look, config.likeness)
-        self._sure = look.points / (look.points + config.fusion.points)
+        self._sure = look.points / (look.points + config.steering.points)
         self._certain = config.alignment.at_once
 
     def run(self, hasty: bool) -> None:
@@ -101,18 +101,18 @@ class Rounds:
             if self._found():
                 return True
         # With a score of 1, the best there is, none of those left would be the most probable.
-        most = self._counted[self._left].max(initial=-np.inf) + self._config.fusion.alignment
+        most = self._counted[self._left].max(initial=-np.inf) + self._config.steering.alignment
         return bool(self._agreed().max() > most)
 
     def _found(self) -> bool:
         """Whether the best is right for all that speaks against it, and stands out."""
         from scipy.special import softmax
 
-        own, weight = self._config.alignment, self._config.fusion.alignment
+        own, weight = self._config.alignment, self._config.steering.alignment
         total = self._agreed(self._sure)
         best = int(total.argmax())
         unlike = weight * (1 - self._placed.agreed[best]) - self._shape[best]
         return bool(unlike <= self._certain and softmax(total)[best] >= own.distinct)
 
     def _agreed(self, sure: float = 1.0) -> Nats:
-        return self._counted + sure * self._config.fusion.alignment * self._placed.agreed
+        return self._counted + sure * self._config.steering.alignment * self._placed.agreed

@@ -27,7 +27,6 @@ from brrp_cli.retrieval.similarity import lit_histograms, similarity
 class Steps:
     """The steps with one prior, and what they hold in memory. Another process makes its own.
 
-    aligns : whether objects are laid over what is seen, as they are in large priors
     gains : (g, 3) of the lights that are tried
     """
 
@@ -38,16 +37,6 @@ class Steps:
         self._shortlist = Shortlist(self._looks.first, own)
         self._models = HeldModels(prior, own.alignment)
         self.gains = lights(own.illuminants)
-        self.aligns = len(prior.names) >= own.alignment.from_objects
-        self._similarity = own.similarity
-        if not self.aligns:
-            self._similarity = replace(
-                own.similarity,
-                plain_colour=own.similarity.neutral_colour,
-                blur=0.0,
-                least_pairs=0.0,
-                size_most=np.inf,
-            )
 
     def __reduce__(self) -> tuple[Callable[..., Steps], tuple[Prior, Config, int]]:
         return _steps, self._made_of
@@ -59,7 +48,9 @@ class Steps:
         histograms = lit_histograms(seen, self.gains)
         rows = self._shortlist.rows(seen, histograms)
         stored = self._looks.rows(rows)
-        look = similarity(seen, histograms, stored, rows, len(self.gains), self._similarity)
+        look = similarity(
+            seen, histograms, stored, rows, len(self.gains), config.retrieval.similarity
+        )
         return look, seen.points
 
     def aligned(
@@ -74,13 +65,13 @@ class Steps:
         """With the alignment scores of the objects that are `likely` (m,) by their looks; in haste,
         of fewer of them."""
         prior, config, seed = self._made_of
-        own, fusion = config.retrieval.alignment, config.retrieval.fusion
+        own, steering = config.retrieval.alignment, config.retrieval.steering
         if image.plane is None:
             return replace(look, alignment=own.neutral)
 
         def against(bare: Shares, spilled: Shares) -> Shares:
-            nats = against_silhouettes(bare, spilled, image.wave, fusion)
-            return nats / max(fusion.alignment, 1.0)
+            nats = against_silhouettes(bare, spilled, image.wave, steering)
+            return nats / max(steering.alignment, 1.0)
 
         shuffled = points[np.random.default_rng(seed).permutation(len(points))]
         seen = seen_part(

@@ -16,7 +16,6 @@ from for_helpers import Common
 from table_scene import box, in_camera, photograph, placed
 
 from brrp_cli import Reconstructor, open_prior
-from brrp_cli.config import preset
 from brrp_cli.errors import PriorError
 from brrp_cli.methods.registry import METHODS
 from brrp_cli.methods.shared_work import MOST, shared_work, started_later
@@ -125,15 +124,11 @@ def test_only_a_method_that_gains_by_it_has_helpers(method, workers, count):
     assert started_later(METHODS[method], workers, None).count == count
 
 
-@pytest.mark.parametrize("from_objects", [100, 1], ids=["looked at", "laid over"])
-def test_a_session_with_helpers_has_the_bytes_of_one_without(prior, frame, from_objects):
+def test_a_session_with_helpers_has_the_bytes_of_one_without(prior, frame):
     bare = frame.with_masks(np.zeros_like(frame.segmap))
-    config = preset("default")
-    alignment = replace(config.retrieval.alignment, from_objects=from_objects)
-    config = replace(config, retrieval=replace(config.retrieval, alignment=alignment))
     with (
-        Reconstructor(prior, config=config, workers=1) as alone,
-        Reconstructor(prior, config=config, workers=2) as session,
+        Reconstructor(prior, workers=1) as alone,
+        Reconstructor(prior, workers=2) as session,
     ):
         assert not session.helpers.any_ready
         for seen in (frame, frame, bare):

@@ -80,6 +80,7 @@ def test_what_hardly_lies_on_what_is_seen_has_no_weight(frame, score):
     assert enough > 0
 
 
-def test_depth_counts_once_where_retrieval_knows_it():
+def test_depth_counts_less_where_retrieval_knows_it():
     assert counted_once(CONFIG, False) is CONFIG
-    assert counted_once(CONFIG, True).likelihood.depth == 0
+    known = counted_once(CONFIG, True).likelihood.depth
+    assert known == CONFIG.likelihood.known_depth < CONFIG.likelihood.depth

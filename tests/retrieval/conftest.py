@@ -56,5 +56,5 @@ def prior(tmp_path_factory: pytest.TempPathFactory) -> Prior:
 
 
 @pytest.fixture
-def aligner(prior: Prior) -> AppearanceRetriever:
-    return retriever_of(prior, True)
+def retriever(prior: Prior) -> AppearanceRetriever:
+    return retriever_of(prior)

@@ -14,9 +14,9 @@ from brrp_cli.retrieval.base import hasty, one_image
 from brrp_cli.retrieval.held_models import HeldModels
 
 
-def test_what_is_seen_lies_on_the_true_object_alone(prior, aligner):
+def test_what_is_seen_lies_on_the_true_object_alone(prior, retriever):
     frame, names = scene()
-    for object_id, look in aligner.evidence(frame).items():
+    for object_id, look in retriever.evidence(frame).items():
         score = dict(zip([prior.names[row] for row in look.rows], look.alignment, strict=True))
         if object_id == STRANGER:
             assert max(score.values()) < 0.7
@@ -27,10 +27,10 @@ def test_what_is_seen_lies_on_the_true_object_alone(prior, aligner):
         assert max(v for other, v in score.items() if other not in same) < score[name] - 0.15
 
 
-def test_the_true_object_alone_fills_its_mask_and_no_more(prior, aligner):
+def test_the_true_object_alone_fills_its_mask_and_no_more(prior, retriever):
     frame, names = scene()
     others = []
-    for object_id, look in aligner.evidence(frame).items():
+    for object_id, look in retriever.evidence(frame).items():
         if object_id == STRANGER:
             continue
         own = look.rows.tolist().index(prior.names.index(names[object_id]))
@@ -75,8 +75,8 @@ def test_more_objects_are_tried_until_one_lies_well(prior):
     frame, names = scene()
 
     def aligned(**numbers):
-        aligner = retriever_of(prior, True, margin=100.0, unaligned=0.1, **numbers)
-        found = aligner.evidence(frame)
+        retriever = retriever_of(prior, margin=100.0, unaligned=0.1, **numbers)
+        found = retriever.evidence(frame)
         return {i: int((found[i].alignment > 0.1).sum()) for i in (*names, STRANGER)}
 
     assert set(aligned(tried=(1,), glanced=()).values()) == {1}
@@ -89,7 +89,7 @@ def test_more_objects_are_tried_until_one_lies_well(prior):
 def test_in_haste_the_first_round_is_all(prior):
     frame, names = scene()
     numbers = ONE_BY_ONE | {"tried": (1, 2), "distinct": 1.0}
-    retriever = retriever_of(prior, True, worth=10_000.0, **numbers)
+    retriever = retriever_of(prior, worth=10_000.0, **numbers)
 
     def tried(object_id):
         return int((retriever.evidence(frame, [object_id])[object_id].alignment > 0.1).sum())
@@ -106,7 +106,7 @@ def test_after_a_glance_a_share_of_the_prior_is_tried(prior):
 
     def tried(share, least):
         numbers = ONE_BY_ONE | {"glanced": (share,), "least": least, "distinct": 1.0}
-        found = retriever_of(prior, True, worth=10_000.0, **numbers).evidence(frame)
+        found = retriever_of(prior, worth=10_000.0, **numbers).evidence(frame)
         return max(int((found[i].alignment > 0.1).sum()) for i in names)
 
     plain = int(np.sum(~prior.appearance.first.colour.any(axis=1)))
@@ -121,8 +121,8 @@ def test_rounds_end_where_none_of_those_left_could_become_the_most_probable(prio
     frame, names = scene()
 
     def aligned(worth):
-        aligner = retriever_of(prior, True, worth=worth, **ONE_BY_ONE)
-        found = aligner.evidence(frame)
+        retriever = retriever_of(prior, worth=worth, **ONE_BY_ONE)
+        found = retriever.evidence(frame)
         return {i: int((found[i].alignment > 0.1).sum()) for i in names}
 
     # The more alignment scores weigh beside looks, the longer the others have a chance; but
@@ -157,7 +157,6 @@ def test_what_looks_do_not_find_a_glance_finds(prior):
     def found(**numbers):
         alignment = dataclasses.replace(
             own.alignment,
-            from_objects=1,
             tried=(1,),
             least=1,
             certain=0.0,
@@ -168,6 +167,7 @@ def test_what_looks_do_not_find_a_glance_finds(prior):
             own,
             alignment=alignment,
             likeness=dataclasses.replace(own.likeness, **blind),
+            steering=dataclasses.replace(own.steering, **blind),
             fusion=dataclasses.replace(own.fusion, **blind),
         )
         retriever = AppearanceRetriever(prior, dataclasses.replace(config, retrieval=retrieval), 0)
@@ -179,7 +179,7 @@ def test_what_looks_do_not_find_a_glance_finds(prior):
 
 
 @pytest.mark.parametrize("kept", [0.0, 0.2])
-def test_where_depth_shows_nothing_or_little_the_mask_tells(prior, aligner, kept):
+def test_where_depth_shows_nothing_or_little_the_mask_tells(prior, retriever, kept):
     """Without colours, so that only the silhouette is left."""
     frame, names = scene()
     grey = np.full_like(frame.rgb, 127)
@@ -188,7 +188,7 @@ def test_where_depth_shows_nothing_or_little_the_mask_tells(prior, aligner, kept
         points = frame.points.copy()
         points[(frame.segmap == object_id) & lost] = np.nan
         blind = dataclasses.replace(frame, points=points, rgb=grey)
-        look = aligner.evidence(blind)[object_id]
+        look = retriever.evidence(blind)[object_id]
         assert (look.points == 0) == (kept == 0)
         own = look.rows.tolist().index(prior.names.index(name))
         assert look.bare[own] < 0.1 and look.spilled[own] < 0.1
@@ -199,27 +199,27 @@ def test_where_depth_shows_nothing_or_little_the_mask_tells(prior, aligner, kept
 
 def test_in_haste_fewer_objects_are_tried_and_what_is_known_is_used(prior):
     frame, _ = scene()
-    aligner = retriever_of(prior, True, worth=10_000.0, **ONE_BY_ONE)
+    retriever = retriever_of(prior, worth=10_000.0, **ONE_BY_ONE)
 
     def tried():
-        return int((aligner.evidence(frame)[STRANGER].alignment > 0.1).sum())
+        return int((retriever.evidence(frame)[STRANGER].alignment > 0.1).sum())
 
-    with hasty(aligner):
+    with hasty(retriever):
         assert tried() == 1
-    with one_image(aligner):
-        with hasty(aligner):
+    with one_image(retriever):
+        with hasty(retriever):
             assert tried() == 1
         every = tried()
         assert every > 1
-        with hasty(aligner):
+        with hasty(retriever):
             assert tried() == every
 
 
-def test_without_a_plane_nothing_is_aligned(aligner):
+def test_without_a_plane_nothing_is_aligned(retriever):
     frame, _ = scene()
     floating = np.where((frame.segmap == 0)[..., None], np.nan, frame.points)
     bare = dataclasses.replace(frame, points=floating.astype(np.float32))
     config = preset("default")
     neutral = config.retrieval.alignment.neutral
     assert scene_plane(bare, config.observation, 0) is None
-    assert all(np.all(look.alignment == neutral) for look in aligner.evidence(bare).values())
+    assert all(np.all(look.alignment == neutral) for look in retriever.evidence(bare).values())

@@ -12,11 +12,6 @@ from brrp_cli.retrieval import steps
 from brrp_cli.retrieval.base import hasty, helped, one_image, sendable, unknown
 
 
-@pytest.fixture(params=["aligned", "by looks alone"])
-def retriever(prior, request):
-    return retriever_of(prior, request.param == "aligned")
-
-
 def test_the_prior_says_which_meshes_have_colours(prior):
     assert all(entry.record["coloured"] for entry in prior.manifest.objects)
 
@@ -32,12 +27,12 @@ def test_the_true_object_is_first_in_any_light(prior, retriever, light):
         assert unknown(probabilities) < 0.5
 
 
-def test_the_papers_preset_aligns_as_the_default_does(prior, aligner):
+def test_the_papers_preset_aligns_as_the_default_does(prior, retriever):
     frame, names = scene()
-    paper = retriever_of(prior, True, "paper")
+    paper = retriever_of(prior, "paper")
     for object_id in names:
         np.testing.assert_allclose(
-            paper.probabilities(frame, object_id), aligner.probabilities(frame, object_id)
+            paper.probabilities(frame, object_id), retriever.probabilities(frame, object_id)
         )
 
 
@@ -93,7 +88,7 @@ def test_a_copy_elsewhere_answers_alike_and_knows_what_was_seen(prior, retriever
     monkeypatch.setattr(steps, "see_object", None)
     np.testing.assert_array_equal(copy.probabilities(frame, 4), known)
     monkeypatch.undo()
-    fresh = from_bytes(to_bytes(retriever_like(prior, retriever), prior), prior)
+    fresh = from_bytes(to_bytes(retriever_of(prior), prior), prior)
     with hasty(fresh):
         np.testing.assert_array_equal(fresh.probabilities(frame, 4), expected)
 
@@ -106,11 +101,6 @@ def same(found, expected):
             np.testing.assert_array_equal(
                 getattr(found[object_id], field.name), getattr(look, field.name)
             )
-
-
-def retriever_like(prior, retriever):
-    """Another, which has seen nothing."""
-    return retriever_of(prior, retriever.aligns)
 
 
 def test_a_stranger_is_told(retriever):
@@ -130,7 +120,7 @@ def test_without_colours_shape_and_size_are_left(prior, retriever):
             assert ranked[0] == name
 
 
-def test_colours_that_say_nothing_leave_it_to_alignment(prior, aligner):
+def test_colours_that_say_nothing_leave_it_to_alignment(prior, retriever):
     """Half of a box is hidden: its size is too small, and it still lies on the stored box."""
     frame, names = scene()
     segmap = frame.segmap.copy()
@@ -138,7 +128,7 @@ def test_colours_that_say_nothing_leave_it_to_alignment(prior, aligner):
     cut = columns > np.median(columns)
     segmap[rows[cut], columns[cut]] = 0
     grey = dataclasses.replace(frame, segmap=segmap, rgb=np.full_like(frame.rgb, 127))
-    probabilities = aligner.probabilities(grey, 3)
+    probabilities = retriever.probabilities(grey, 3)
     best = [prior.names[k] for k in np.argsort(-probabilities)[:2]]
     assert set(best) == {"red_box", "blue_box"} and names[3] in best
 

@@ -36,18 +36,17 @@ def painted_prior(folder: Path) -> Prior:
     return open_prior(folder / "prior")
 
 
-def retriever_of(prior, aligned, name="default", worth=None, **numbers):
-    """Of a small prior, whose objects are aligned only where that is asked for; worth : nats of an
-    alignment score of 1."""
+def retriever_of(prior, name="default", worth=None, **numbers):
+    """With other numbers of alignment; worth : nats of an alignment score of 1, where the rounds
+    end."""
     config = preset(name)
-    if aligned:
-        alignment = dataclasses.replace(config.retrieval.alignment, from_objects=1, **numbers)
-        fusion = config.retrieval.fusion
-        if worth is not None:
-            fusion = dataclasses.replace(fusion, alignment=worth)
-        own = dataclasses.replace(config.retrieval, alignment=alignment, fusion=fusion)
-        config = dataclasses.replace(config, retrieval=own)
-    return AppearanceRetriever(prior, config, 0)
+    retrieval = config.retrieval
+    own = dataclasses.replace(
+        retrieval, alignment=dataclasses.replace(retrieval.alignment, **numbers)
+    )
+    if worth is not None:
+        own = dataclasses.replace(own, steering=dataclasses.replace(own.steering, alignment=worth))
+    return AppearanceRetriever(prior, dataclasses.replace(config, retrieval=own), 0)
 
 
 def scene(light=(1.0, 1.0, 1.0)):

@@ -56,7 +56,7 @@ def test_it_counts_as_the_likelihood_does():
         mask = Mask("made", "0", 1, "thing", 100, True, 0.2, False, [row])
         expected = log_likelihood(told, config) - config.other_size
         assert ratios(mask, config) == pytest.approx([expected])
-        less = replace(config, depth=0.0)
+        less = replace(config, depth=config.known_depth)
         expected = log_likelihood(told, less) - config.other_size
         assert ratios(replace(mask, aligned=True), config) == pytest.approx([expected])
 
