@@ -27,11 +27,12 @@ from numpy.typing import NDArray
 # The script also runs from a checkout that is not installed.
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
+from shown_object import shown_object
+
 from brrp_cli.config import preset
 from brrp_cli.config.retrieval import FusionConfig, IlluminantsConfig
 from brrp_cli.errors import BrrpError
 from brrp_cli.evaluation.calibration import expected_calibration_error
-from brrp_cli.frames.frame import Frame
 from brrp_cli.ground_truth.scenes import find_scenes
 from brrp_cli.prior.store import Prior, open_prior
 from brrp_cli.progress import progress
@@ -98,7 +99,7 @@ def look(prior: Prior, folder: Path, segmented: bool) -> list[View]:
             given = scene.view(index)
             frame = replace(given, segmap=segment(given)) if segmented else given
             found = retriever.evidence(frame)
-            shown = [mostly(frame.segmap == i, given) for i in found]
+            shown = [shown_object(frame.segmap == i, given) for i in found]
             names = [scene.object(i).name if i else "" for i in shown]
             views.append(
                 View(
@@ -110,12 +111,6 @@ def look(prior: Prior, folder: Path, segmented: bool) -> list[View]:
                 )
             )
     return views
-
-
-def mostly(mask: NDArray[np.bool_], frame: Frame) -> int:
-    """The object of the frame that most pixels with depth of a mask show; 0 = none."""
-    pixels = np.maximum(frame.segmap[mask & frame.valid], 0)
-    return int(np.bincount(pixels).argmax()) if len(pixels) else 0
 
 
 def left_out(view: View) -> View:

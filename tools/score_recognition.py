@@ -35,6 +35,8 @@ import numpy as np
 # The script also runs from a checkout that is not installed.
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
+from shown_object import shown_object
+
 from brrp_cli.config.segmentation import SegmentConfig
 from brrp_cli.dependencies import import_open3d
 from brrp_cli.errors import BrrpError
@@ -44,7 +46,7 @@ from brrp_cli.geometry import transform_points
 from brrp_cli.ground_truth.scenes import Scene, find_scenes, true_mesh_in_camera
 from brrp_cli.prior.store import Prior, open_prior
 from brrp_cli.raycast import raycasting_scene
-from brrp_cli.reconstruction import ObjectReconstruction, Reconstruction, Retrieved
+from brrp_cli.reconstruction import Retrieved
 from brrp_cli.segmentation.left_out import border_share
 from brrp_cli.segmentation.segment import segment
 from brrp_cli.session import Reconstructor
@@ -105,7 +107,10 @@ def rows_of(
     seconds = time.perf_counter() - start
     unmasked = replace(frame, segmap=np.zeros_like(frame.segmap))
     result = again(frame if given else unmasked)
-    told = {item.object_id: _mostly(item, result, frame) for item in result.objects}
+    told = {
+        item.object_id: shown_object(result.frame.segmap == item.object_id, frame)
+        for item in result.objects
+    }
     rows: list[Row] = []
     for object_id in frame.object_ids:
         name = scene.object(object_id).name
@@ -153,12 +158,6 @@ def rows_of(
             )
     rows.append({"scene": scene.name, "masks": len(result.objects)})
     return rows
-
-
-def _mostly(item: ObjectReconstruction, result: Reconstruction, frame: Frame) -> int:
-    """The true object of most of a mask; 0 = none."""
-    mine = frame.segmap[(result.frame.segmap == item.object_id) & frame.valid]
-    return int(np.bincount(np.maximum(mine, 0)).argmax()) if len(mine) else 0
 
 
 def _distance(

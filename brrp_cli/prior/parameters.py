@@ -33,11 +33,14 @@ class PoseConfig:
     """Which resting poses are kept.
 
     hull_faces : at most, of the hull that an object rests on; tolerance : by how much that hull may
-        lie off at first, times the diagonal of the object's box
+        lie off at first, times the diagonal of the object's box; growth : of that, as often as ways
+        to fall are lost; complete : probability of all ways to fall that are not, at least
     """
 
     hull_faces: int = 400
     tolerance: float = 1e-4
+    growth: float = 1.5
+    complete: float = 0.999
     merge_degrees: float = 10.0
     min_probability: float = 0.01
     max_count: int = 12

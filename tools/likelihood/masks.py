@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from shown_object import shown_object
 
 from brrp_cli.config import LikelihoodConfig, preset
 from brrp_cli.dependencies import import_open3d
@@ -86,7 +87,6 @@ def collect(
     hypotheses = config.hypotheses
     assert hypotheses is not None
     given = scene.view(0)
-    truth = given.segmap
     frame = replace(given, segmap=segment(given)) if segmented else given
     retriever = choose_retriever("appearance", prior, config, 0)
     cleaned = without_strays(frame, config.strays)
@@ -95,8 +95,8 @@ def collect(
     wave = wave_deviation(cleaned, seen.plane, hypotheses.sensor)
     masks = []
     for number, observation in seen.objects.items():
-        mine = truth[(frame.segmap == number) & frame.valid]
-        true_id = int(np.bincount(np.maximum(mine, 0)).argmax()) if len(mine) else 0
+        mine = frame.segmap == number
+        true_id = shown_object(mine, given)
         name = scene.object(true_id).name if true_id else "nothing"
         probabilities = retriever.probabilities(frame, number)
         points = child_rng(0, "testimony", number).permutation(observation.points)
@@ -142,7 +142,7 @@ def collect(
                 scene.name,
                 int(number),
                 name,
-                len(mine),
+                int(np.count_nonzero(mine & frame.valid)),
                 name in prior.names,
                 unknown(np.array([share for _, share in chosen])),
                 knows_depth(retriever),

@@ -14,10 +14,6 @@ from brrp_cli.prior.parameters import PoseConfig
 if TYPE_CHECKING:
     import trimesh
 
-# Times the tolerance, until all ways to fall are accounted for.
-TOLERANCES = 1.5 ** np.arange(24)
-COMPLETE = 0.999
-
 
 def resting_poses(mesh: trimesh.Trimesh, config: PoseConfig) -> list[RestingPose]:
     """Resting poses of a closed mesh of even density, most probable first, at least one.
@@ -59,11 +55,12 @@ def _stable_poses(
 
     hull = manifold3d.Manifold.hull_points(np.asarray(mesh.vertices))
     best, most = (np.empty((0, 4, 4)), np.empty(0)), 0.0
-    for tolerance in mesh.scale * config.tolerance * TOLERANCES:
-        simpler = hull.simplify(tolerance)
-        if simpler.is_empty():
-            break
-        if simpler.num_tri() > config.hull_faces:
+    tolerance = config.tolerance
+    # No hull is left where the tolerance is the size of the mesh.
+    while tolerance < 1 and most < config.complete:
+        simpler = hull.simplify(mesh.scale * tolerance)
+        tolerance *= config.growth
+        if simpler.is_empty() or simpler.num_tri() > config.hull_faces:
             continue
         corners = simpler.to_mesh64().vert_properties[:, :3]
         with np.errstate(invalid="ignore"):
@@ -72,8 +69,6 @@ def _stable_poses(
             )
         if (total := float(found[1].sum())) > most:
             best, most = found, total
-        if most > COMPLETE:
-            break
     if not most:
         raise MeshError("The mesh rests on no face of its hull", found=f"{len(mesh.faces)} faces")
     return best
