@@ -188,11 +188,13 @@ class FusionConfig:
     `usual` score of a right one; where depth has waves of more than `wave` metres it counts less,
     since they lower the scores of all. `bare` and `spilled` are nats for a placement that leaves
     the whole mask bare, up to the share `most_bare`, or covers e - 1 times as much beside it;
-    they, too, count less in waves, since the cameras that have them blur silhouettes.
+    they, too, count less in waves, since the cameras that have them blur silhouettes. In priors of
+    more than `few` objects all of it counts for more, by the power `sharper` of how many times
+    `few` they are: thousands that are a little alike would together outweigh the one that is it.
 
     Of least loss, as tools/fit_appearance.py counts it, on made scenes of YCB and household objects
     and of their variants, structured light and the other three sensors, masks given and from depth,
-    and priors of 50, 70, 134 and 274 objects. docs/retrieval.md tells which.
+    and priors of 50 to 1,196 objects. docs/retrieval.md tells which.
     """
 
     colour: float = 35.0
@@ -201,6 +203,8 @@ class FusionConfig:
     alignment: float = between(17.5, 0.0, 1000.0)
     offset: float = between(10.5, -100.0, 100.0)
     crowding: float = between(0.63, 0.0, 10.0)
+    few: int = 270
+    sharper: float = between(0.4, 0.0, 1.0)
     points: float = between(150.0, 1.0, 1e6)
     bare: float = between(41.0, 0.0, 1000.0)
     spilled: float = between(5.3, 0.0, 1000.0)
@@ -235,7 +239,14 @@ class RetrievalConfig:
     similarity: SimilarityConfig = field(default_factory=SimilarityConfig)
     likeness: FusionConfig = field(
         default_factory=lambda: FusionConfig(
-            colour=24.26, pairs=25.27, size=0.44, alignment=0.0, fit=0.0, offset=9.88, crowding=1.0
+            colour=24.26,
+            pairs=25.27,
+            size=0.44,
+            alignment=0.0,
+            fit=0.0,
+            offset=9.88,
+            crowding=1.0,
+            sharper=0.0,
         )
     )
     steering: FusionConfig = field(
@@ -246,6 +257,7 @@ class RetrievalConfig:
             alignment=45.0,
             offset=9.15,
             crowding=0.4,
+            sharper=0.0,
             bare=16.0,
             spilled=5.0,
             fit=30.0,

@@ -2,10 +2,11 @@
 
 For object i of the frame, stored object c and light g, with n stored objects:
 
-    s_i(c, g) = offset + colour (B_i(c, g) - 1) + pairs (1 - h_i) (D_i(c) - 1) + size Z_i(c)
+    s_i(c, g) = max(1, n / few)^sharper (
+                offset + colour (B_i(c, g) - 1) + pairs (1 - h_i) (D_i(c) - 1) + size Z_i(c)
                 + [alignment (A_i(c) - A_i) + fit_i (A_i - usual)] m_i / (m_i + points)
                 - bare_i min(b_i(c), most_bare) - spilled_i ln(1 + o_i(c))
-                - crowding ln n,    fit_i = fit min(1, wave / w), and so bare_i, spilled_i
+                - crowding ln n),    fit_i = fit min(1, wave / w), and so bare_i, spilled_i
 
 B and D are Bhattacharyya coefficients of colours and of point pairs, in [0, 1], h the hidden share
 of the silhouette, Z <= 0 what speaks against the size and A <= 1 the alignment score of c laid over
@@ -125,4 +126,5 @@ def _log_odds(item: Similarity, count: int, weights: FusionConfig) -> NDArray[np
     shape = shape + sure * (behind + weights.fit * clear * (best - weights.usual))
     shape = shape - against_silhouettes(item.bare, item.spilled, item.wave, weights)
     colour = weights.colour * (item.colour.astype(np.float64) - 1)
-    return np.asarray(weights.offset + colour + shape - weights.crowding * np.log(count))
+    odds = weights.offset + colour + shape - weights.crowding * np.log(count)
+    return np.asarray(max(1.0, count / weights.few) ** weights.sharper * odds)
