@@ -144,10 +144,10 @@ def without(item: Similarity, row: int) -> Similarity:
 
 def fit(views: Sequence[View], in_use: FusionConfig) -> FusionConfig:
     """The weights with the least loss, all of them positive; what depends on the sensor, and the
-    size of a small prior, stay."""
+    sizes of priors, stay."""
     from scipy.optimize import minimize
 
-    begin = {k: v for k, v in asdict(in_use).items() if k not in ("usual", "wave", "few")}
+    begin = {k: v for k, v in asdict(in_use).items() if k not in ("usual", "wave", "few", "many")}
 
     def weights(x: NDArray[np.float64]) -> FusionConfig:
         found = zip(begin, np.exp(x), strict=True)

@@ -190,7 +190,8 @@ class FusionConfig:
     the whole mask bare, up to the share `most_bare`, or covers e - 1 times as much beside it;
     they, too, count less in waves, since the cameras that have them blur silhouettes. In priors of
     more than `few` objects all of it counts for more, by the power `sharper` of how many times
-    `few` they are: thousands that are a little alike would together outweigh the one that is it.
+    `few` they are, up to `many`, beyond which nothing was fitted: a thousand that are a little
+    alike would together outweigh the one that is it.
 
     Of least loss, as tools/fit_appearance.py counts it, on made scenes of YCB and household objects
     and of their variants, structured light and the other three sensors, masks given and from depth,
@@ -204,6 +205,7 @@ class FusionConfig:
     offset: float = between(10.5, -100.0, 100.0)
     crowding: float = between(0.63, 0.0, 10.0)
     few: int = 270
+    many: int = 1_200
     sharper: float = between(0.4, 0.0, 1.0)
     points: float = between(150.0, 1.0, 1e6)
     bare: float = between(41.0, 0.0, 1000.0)

@@ -2,7 +2,7 @@
 
 For object i of the frame, stored object c and light g, with n stored objects:
 
-    s_i(c, g) = max(1, n / few)^sharper (
+    s_i(c, g) = max(1, min(n, many) / few)^sharper (
                 offset + colour (B_i(c, g) - 1) + pairs (1 - h_i) (D_i(c) - 1) + size Z_i(c)
                 + [alignment (A_i(c) - A_i) + fit_i (A_i - usual)] m_i / (m_i + points)
                 - bare_i min(b_i(c), most_bare) - spilled_i ln(1 + o_i(c))
@@ -127,4 +127,5 @@ def _log_odds(item: Similarity, count: int, weights: FusionConfig) -> NDArray[np
     shape = shape - against_silhouettes(item.bare, item.spilled, item.wave, weights)
     colour = weights.colour * (item.colour.astype(np.float64) - 1)
     odds = weights.offset + colour + shape - weights.crowding * np.log(count)
-    return np.asarray(max(1.0, count / weights.few) ** weights.sharper * odds)
+    larger = max(1.0, min(count, weights.many) / weights.few)
+    return np.asarray(larger**weights.sharper * odds)

@@ -55,10 +55,14 @@ def test_the_formula_in_plain_numbers():
 def test_evidence_counts_for_more_in_larger_priors():
     # Four times as many objects as `few`, to the power 1/2: twice the log odds.
     item = seen([[0.9, 1.0]], pairs=(1.0, 0.8), size=(-3.0, 0.0), hidden=0.5)
-    weights = replace(WEIGHTS, few=50, sharper=0.5)
+    weights = replace(WEIGHTS, few=50, many=200, sharper=0.5)
     found = believe([item], np.zeros(1), np.eye(1), 200, weights)[0]
     odds = np.exp(2 * (np.array([8 - 2 - 1.5, 8 - 2.0]) - np.log(200)))
     np.testing.assert_allclose(found[:2], odds / (1 + odds.sum()), rtol=1e-5)
+    # Not for more than that in even larger ones: only the crowding grows.
+    crowded = believe([item], np.zeros(1), np.eye(1), 800, weights)[0]
+    odds = np.exp(2 * (np.array([8 - 2 - 1.5, 8 - 2.0]) - np.log(800)))
+    np.testing.assert_allclose(crowded[:2], odds / (1 + odds.sum()), rtol=1e-5)
     # In smaller ones they are as they are.
     small = believe([item], np.zeros(1), np.eye(1), 2, weights)[0]
     plain = believe([item], np.zeros(1), np.eye(1), 2, replace(weights, sharper=0.0))[0]
