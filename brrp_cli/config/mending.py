@@ -48,9 +48,16 @@ class RegroupConfig:
 
     rounds : times that this is done at most, of what the last one changed; 0 = never
     most : tries in a round at most
-    least_weight : of a stored object in a mask that is not regrouped; sure : in one that was tried,
-        to be taken; explained : part of that mask that it explains as it was placed, at least;
-        within : part of what it explains of all masks that lies in that one
+    least_weight : of a stored object in a mask that is not regrouped, and of all of them together
+        in one that is not cut
+    sure : of a stored object in a part of a mask, to be taken; whole : in a union of masks, or in
+        one that was left out, and in any from which a mask is grown; half : in each of two parts
+        that make up `both` of a mask
+    explained : part of a tried mask that the object explains as it was placed, at least; within :
+        part of what it explains of all masks that lies in that one
+    grown : masks made of what an object explains that are tried in a round at most; closing :
+        pixels, half the width of gaps in them that are closed; least_share : of such a mask that
+        is of one of those before
     reach, gap : pixels and metres in depth within which masks are neighbours
     least_pixels : with depth, of a mask that is tried; least_cut : of one that is cut
     colours : numbers of groups of pixels that are alike in colour and place; places : what a pixel
@@ -65,10 +72,16 @@ class RegroupConfig:
     most: int = between(60, 0, 10_000)
     least_weight: float = share(0.8)
     sure: float = share(0.95)
+    whole: float = share(0.8)
+    half: float = share(0.5)
+    both: float = share(0.85)
     explained: float = share(0.6)
     within: float = share(0.5)
+    grown: int = between(8, 0, 1000)
+    closing: int = between(2, 1, 64)
+    least_share: float = share(0.02)
     reach: int = between(3, 1, 64)
-    gap: float = 0.015
+    gap: float = 0.1
     least_pixels: int = 300
     least_cut: int = 1000
     colours: tuple[int, ...] = (2, 4)

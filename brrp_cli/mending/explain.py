@@ -11,6 +11,8 @@ from brrp_cli.geometry import backproject, project, transform_points
 from brrp_cli.prior.store import Prior
 from brrp_cli.reconstruction import Retrieved
 
+Mask = NDArray[np.bool_]
+
 
 def rendered(found: Retrieved, prior: Prior, frame: Frame) -> NDArray[np.float64]:
     """Depth (H, W), metres, of the stored object as it was placed and seen alone; 0 elsewhere."""
@@ -47,11 +49,9 @@ def measured(frame: Frame) -> NDArray[np.floating]:
     return np.where(frame.valid, frame.points[..., 2], np.nan)
 
 
-def explained(
-    found: Retrieved, mask: NDArray[np.bool_], prior: Prior, frame: Frame, config: MendConfig
-) -> int:
-    """How many pixels of a mask (H, W) the object explains as it was placed."""
+def explained(found: Retrieved, prior: Prior, frame: Frame, config: MendConfig) -> Mask:
+    """Pixels (H, W) whose measured depth the object explains as it was placed."""
     depth = rendered(found, prior, frame)
     with np.errstate(invalid="ignore"):
         near = np.abs(depth - measured(frame)) < tolerance(frame, config)
-    return int((mask & (depth > 0) & near).sum())
+    return np.asarray((depth > 0) & near)

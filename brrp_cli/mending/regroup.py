@@ -2,29 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
-from dataclasses import dataclass
-from functools import partial
+from collections.abc import Collection
 
 import numpy as np
 from numpy.typing import NDArray
 
-from brrp_cli.config.mending import RegroupConfig
 from brrp_cli.config.segmentation import SegmentConfig
+from brrp_cli.frames.dilate import opened
 from brrp_cli.frames.frame import BACKGROUND, Frame
 from brrp_cli.mending.again import Again, replaced
-from brrp_cli.mending.explain import explained
+from brrp_cli.mending.chosen import chosen
+from brrp_cli.mending.tries import Tries
 from brrp_cli.prior.store import Prior
 from brrp_cli.reconstruction import ObjectReconstruction, Reconstruction
 from brrp_cli.segmentation.other_masks import OtherMask, other_masks, painted
-
-
-@dataclass(frozen=True)
-class _Found:
-    """A mask in which a stored object is recognised, of which it explains so many pixels."""
-
-    mask: OtherMask
-    pixels: int
 
 
 def regroup(
@@ -72,30 +63,22 @@ def _one_round(
         for each in result.objects
         if (asked is None or each.object_id in asked) and not _recognised(each, own.least_weight)
     ]
-    # What has the shape of a stored object, stretched, is one thing.
-    whole = [each.object_id for each in result.objects if each.like is not None]
+    whole = [each.object_id for each in result.objects if _is_one(each, own.least_weight)]
+    tries = Tries(result, prior, again, config)
     masks = other_masks(frame, doubtful, aside, config, result.seed, whole)
-    found: list[_Found] = []
-    tried: list[ObjectReconstruction] = []
-    if masks:
-        tried = again.masks(frame, [each.mask for each in masks], own.trial, image=result.image)
-    for mask, item in zip(masks, tried, strict=True):
-        if not _recognised(item, own.sure):
-            continue
-        assert item.recognised is not None
-        seen = mask.mask & frame.valid
-        explains = partial(explained, item.recognised, prior=prior, frame=frame, config=config.mend)
-        pixels = explains(seen)
-        # The print on a can looks like a smaller can, which would hide more of the can than that.
-        everywhere = explains(seen | (frame.valid & (frame.segmap != BACKGROUND)))
-        if pixels >= own.explained * seen.sum() and pixels >= own.within * everywhere:
-            found.append(_Found(mask, pixels))
-    chosen = _chosen(found)
-    if not chosen:
+    found = tries.found(masks)
+    free = np.isin(frame.segmap, doubtful)
+    if aside is not None:
+        free |= (aside != BACKGROUND) & (frame.segmap == BACKGROUND)
+    known = tries.known(doubtful) if free.any() else []
+    seeds = sorted([*found, *known], key=lambda each: -each.weight)
+    found += tries.found(tries.grown(seeds, masks, free))
+    taken = chosen([each for each in found if tries.fits(each)], tries)
+    if not taken:
         return result
-    segmap, named = painted(frame.segmap, chosen, first_free)
-    segmap = _without_scraps(segmap, named, frame, own)
-    changed = set(named).union(*(each.of for each in chosen))
+    segmap, named = painted(frame.segmap, taken, first_free)
+    segmap = _without_scraps(segmap, named, frame, config)
+    changed = set(named).union(*(each.of for each in taken))
     return replaced(result, frame.with_masks(segmap), changed, again)
 
 
@@ -104,24 +87,23 @@ def _recognised(item: ObjectReconstruction, least_weight: float) -> bool:
     return found is not None and (found.weight or 0.0) >= least_weight
 
 
-def _chosen(found: Sequence[_Found]) -> list[OtherMask]:
-    """Those that explain most, without such as overlap a better one."""
-    chosen: list[OtherMask] = []
-    for each in sorted(found, key=lambda each: -each.pixels):
-        if not any((each.mask.mask & other.mask).any() for other in chosen):
-            chosen.append(each.mask)
-    return chosen
+def _is_one(item: ObjectReconstruction, least_weight: float) -> bool:
+    """Whether a mask is of one thing: one of the stored objects, whichever of them, or one that has
+    the shape of a stored object, stretched."""
+    stored = item.unknown_weight is not None and 1 - item.unknown_weight >= least_weight
+    return stored or item.like is not None
 
 
 def _without_scraps(
-    segmap: NDArray[np.int64], named: dict[int, OtherMask], frame: Frame, config: RegroupConfig
+    segmap: NDArray[np.int64], named: dict[int, OtherMask], frame: Frame, config: SegmentConfig
 ) -> NDArray[np.int64]:
     """What is left of a mask that was cut stays with the part that was recognised, where it would
-    be no object."""
+    be no object: too small, or no more than a rim."""
     segmap = segmap.copy()
     for object_id, mask in named.items():
         for source in mask.of - {object_id}:
             left = segmap == source
-            if source != BACKGROUND and (left & frame.valid).sum() < config.least_pixels:
+            solid = opened(left, config.mend.opening) & frame.valid
+            if source != BACKGROUND and solid.sum() < config.regroup.least_pixels:
                 segmap[left] = object_id
     return segmap

@@ -25,10 +25,12 @@ Mask = NDArray[np.bool_]
 
 @dataclass(frozen=True)
 class OtherMask:
-    """mask : (H, W); of : the ids of the masks that it is made of, none for what was background"""
+    """mask : (H, W); of : the ids of the masks that it is made of, none for what was background;
+    cut : whether of parts of them"""
 
     mask: Mask
     of: frozenset[int]
+    cut: bool = False
 
 
 def other_masks(
@@ -54,7 +56,8 @@ def other_masks(
         for i in large:
             rng = child_rng(seed, "colour groups", i)
             found += [
-                OtherMask(part, frozenset([i])) for part in parts(frame, i, edges, config, rng)
+                OtherMask(part, frozenset([i]), cut=True)
+                for part in parts(frame, i, edges, config, rng)
             ]
     return [each for each in found if _size(frame, each.mask) >= own.least_pixels][: own.most]
 
@@ -74,12 +77,12 @@ def unions(frame: Frame, ids: Sequence[int], config: RegroupConfig) -> list[froz
 def painted(
     segmap: NDArray[np.integer], masks: Sequence[OtherMask], first_free: int
 ) -> tuple[NDArray[np.int64], dict[int, OtherMask]]:
-    """The map (H, W) with those masks, and which is which, by id: a union has its lowest id, what
-    is new one from `first_free` on."""
+    """The map (H, W) with those masks, and which is which, by id: a union of whole masks has its
+    lowest id, what is new one from `first_free` on."""
     found, named = segmap.astype(np.int64), {}
     free = count(max(int(segmap.max()) + 1, first_free))
     for each in masks:
-        object_id = min(each.of) if len(each.of) > 1 else next(free)
+        object_id = next(free) if each.cut or not each.of else min(each.of)
         found[each.mask] = object_id
         named[object_id] = each
     return found, named

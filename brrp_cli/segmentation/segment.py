@@ -18,7 +18,7 @@ from brrp_cli.frames.frame import BACKGROUND, Frame
 from brrp_cli.segmentation.components import absorb_small
 from brrp_cli.segmentation.fill_concavities import fill_inside
 from brrp_cli.segmentation.join_insides import join_insides
-from brrp_cli.segmentation.left_out import IN_THE_AIR, left_out, told
+from brrp_cli.segmentation.left_out import EDGE, IN_THE_AIR, left_out, told
 from brrp_cli.segmentation.part_objects import part_objects
 from brrp_cli.segmentation.refine_borders import refine_borders
 from brrp_cli.segmentation.region_growing import fill_holes, grow
@@ -49,8 +49,9 @@ def segment(
 def segment_and_aside(
     frame: Frame, seed: int = 0, config: SegmentConfig | None = None, *, keep_all: bool = False
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """What `segment` gives, and the masks (H, W) that it left out because they seem to stand
-    nowhere on the table, 0 = none: what lies on something else may look like that."""
+    """What `segment` gives, and the masks (H, W), 0 = none, that it left out because they seem to
+    stand nowhere on the table, or to be a smear of depth: what lies on something else may look like
+    the former, and what is flat and has no depth around it like the latter."""
     config = config or SegmentConfig()
     seen = see_surfaces(frame, seed, config)
     points, table = seen.points, seen.table
@@ -82,7 +83,7 @@ def _without(
     segmap: NDArray[np.int64], frame: Frame, table: Table, config: SegmentConfig
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """The masks without those that are left out, which the log tells, and of the latter those that
-    stand nowhere."""
+    may be whole objects."""
     segmap = _large(segmap, frame, config.min_area)
     points = np.where(frame.valid[..., None], frame.points, np.nan)
     height = table.plane.signed_distance(points)
@@ -91,10 +92,10 @@ def _without(
     reasons = left_out(segmap, points[..., 2], height, over, config.left_out)
     if reasons:
         log.info("Masks left out: %s (--all keeps them)", told(reasons))
-    in_the_air = [i for i, reason in reasons.items() if reason == IN_THE_AIR]
+    whole = [i for i, reason in reasons.items() if reason in (IN_THE_AIR, EDGE)]
     return (
         np.where(np.isin(segmap, list(reasons)), BACKGROUND, segmap),
-        np.where(np.isin(segmap, in_the_air), segmap, BACKGROUND),
+        np.where(np.isin(segmap, whole), segmap, BACKGROUND),
     )
 
 

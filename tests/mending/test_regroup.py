@@ -17,14 +17,17 @@ from brrp_cli.config.registration import TrialConfig
 from brrp_cli.config.segmentation import SegmentConfig
 from brrp_cli.errors import BrrpError
 from brrp_cli.mending.again import Again
+from brrp_cli.mending.chosen import chosen
 from brrp_cli.mending.mend import mend
 from brrp_cli.mending.regroup import regroup
+from brrp_cli.mending.tries import Found, Tries
 from brrp_cli.prior.build.build import build_prior
 from brrp_cli.prior.parameters import BuildParameters
 from brrp_cli.prior.store import open_prior
 from brrp_cli.reconstruction import TOO_FEW_POINTS, Similar
 from brrp_cli.retrieval.appearance import AppearanceRetriever
 from brrp_cli.retrieval.base import one_image
+from brrp_cli.segmentation.other_masks import OtherMask
 
 # The can and the ball share a mask, the box comes in two, the plate was left out.
 PLACES = {"red_box": (-0.16, 0.06), "red_can": (0.1, 0.08), "yellow_ball": (0.1, -0.05)}
@@ -108,6 +111,36 @@ def test_what_is_regrouped_has_a_mesh_and_what_stayed_is_what_it_was(first, mend
     assert stranger is kept[STRANGE_ID] and stranger.recognised is None
 
 
+def test_an_object_whose_parts_lie_in_two_masks_is_found_by_what_it_explains(given, truth, prior):
+    """The rest of the box shares a mask with the can: neither mask, nor both, is of one thing."""
+    box, columns = truth.segmap == 1, np.broadcast_to(np.arange(truth.shape[1]), truth.shape)
+    rest = box & (columns > np.quantile(columns[box], 0.6))
+    segmap = np.select([rest | (truth.segmap == 2), box], [BOTH, BOX], 0)
+    mixed = truth.with_masks(segmap)
+    again = Again(partial(reconstruct, **given), partial(try_masks, **given))
+    result = mend(reconstruct(mixed, **given), prior, again, SegmentConfig())
+    found = {taken: i for i, taken in taken_for(result).items()}
+    for true_id, name in ((1, "red_box"), (2, "red_can")):
+        mine, mask = result.frame.segmap == found[name], truth.segmap == true_id
+        assert (mine & mask).sum() > 0.9 * (mine | mask).sum(), name
+
+
+def test_two_halves_need_less_weight_than_one_part(first, prior, again, frame, truth):
+    tries = Tries(first, prior, again, SegmentConfig())
+    own = tries.config.regroup
+
+    def half(true_id, weight):
+        mask = (frame.segmap == BOTH) & (truth.segmap == true_id)
+        return Found(OtherMask(mask, frozenset([BOTH]), cut=True), weight, mask)
+
+    likely = [half(2, own.half), half(3, own.half)]
+    assert {id(each) for each in chosen(likely, tries)} == {id(each.mask) for each in likely}
+    assert chosen(likely[:1], tries) == []
+    assert chosen([half(2, 0.9 * own.half), half(3, own.half)], tries) == []
+    (sure,) = chosen([half(2, own.sure)], tries)
+    assert (sure.mask == half(2, 0).mask.mask).all()
+
+
 def test_a_trial_tells_what_a_reconstruction_does_and_infers_nothing(given, truth):
     masks = [truth.segmap == i for i in (1, 2, 3, STRANGE_ID)]
     bare = replace(truth, segmap=np.zeros_like(truth.segmap))
@@ -157,7 +190,12 @@ def test_nothing_is_tried_where_no_try_is_allowed(first, prior, aside):
     assert regroup(unweighed, prior, nobody, SegmentConfig(), aside) is unweighed
 
 
-def test_what_a_stretched_object_explains_is_not_cut(first, prior, again):
+@pytest.mark.parametrize(
+    "known",
+    [{"similar": [Similar("red_can", 0.9, np.ones(3))]}, {"unknown_weight": 0.1}],
+    ids=["stretched", "one stored object or another"],
+)
+def test_what_is_one_thing_is_not_cut(first, prior, again, known):
     """It may still be a part of something larger."""
     tried = []
 
@@ -166,12 +204,7 @@ def test_what_a_stretched_object_explains_is_not_cut(first, prior, again):
         return again.masks(frame, masks, trial, **known)
 
     spied = Again(again.objects, masks)
-    like = [
-        replace(item, similar=[Similar("red_can", 0.9, np.ones(3))])
-        if item.object_id == BOTH
-        else item
-        for item in first.objects
-    ]
+    like = [replace(item, **known) if item.object_id == BOTH else item for item in first.objects]
     regroup(first, prior, spied, SegmentConfig(), None, [BOTH])
     regroup(replace(first, objects=like), prior, spied, SegmentConfig(), None, [BOTH])
     assert len(tried) == 1 and tried[0]

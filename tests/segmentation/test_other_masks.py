@@ -118,8 +118,10 @@ def test_parts_lie_in_their_mask_are_large_enough_and_come_once():
 def test_a_union_has_its_lowest_id_and_a_part_a_new_one():
     frame = row_of_masks()
     union = OtherMask(frame.segmap >= 2, frozenset([2, 3]))
-    part = OtherMask((frame.segmap == 1) & (np.arange(120) < 30), frozenset([1]))
+    part = OtherMask((frame.segmap == 1) & (np.arange(120) < 30), frozenset([1]), cut=True)
     segmap, named = painted(frame.segmap, [union, part], 1)
     assert named == {2: union, 4: part}
     assert set(np.unique(segmap)) == {0, 1, 2, 4}
     assert (painted(frame.segmap, [part], 9)[0] == 9).sum() == part.mask.sum()
+    parts = OtherMask((frame.segmap > 1) & (np.arange(120) > 50), frozenset([2, 3]), cut=True)
+    assert painted(frame.segmap, [parts], 1)[1] == {4: parts}

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import trimesh
+from scipy.ndimage import binary_dilation
 from table_scene import T_CAM_WORLD, in_camera, photograph
 
 from brrp_cli.config.segmentation import (
@@ -189,6 +190,15 @@ def test_what_hangs_in_the_air_is_left_out_and_what_stands_on_a_thing_is_not():
     assert found.max() == 1 and (found == segment(hanging)).all()
     assert overlap(aside > 0, hanging.segmap == 2) > 0.7
     assert segment(hanging, keep_all=True).max() == 2
+
+
+def test_a_flat_thing_without_depth_around_it_is_left_out_but_not_forgotten():
+    flat = boxes(((0.12, 0.08, 0.022), 0, 0, 0), ((0.06, 0.06, 0.06), -0.2, 0, 0))
+    around = binary_dilation(flat.segmap == 1, iterations=10) & (flat.segmap != 1)
+    lonely = make_frame(rgb=flat.rgb, depth=np.where(around, 0.0, flat.depth), K=flat.K)
+    found, aside = segment_and_aside(lonely)
+    assert overlap(found > 0, flat.segmap == 2) > 0.7
+    assert overlap(aside > 0, flat.segmap == 1) > 0.7
 
 
 def test_a_ball_whose_lower_half_is_hidden_stands_and_a_flat_thing_in_the_air_does_not():
