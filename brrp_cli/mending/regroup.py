@@ -58,11 +58,8 @@ def _one_round(
     first_free: int,
 ) -> Reconstruction:
     frame, own = result.frame, config.regroup
-    doubtful = [
-        each.object_id
-        for each in result.objects
-        if (asked is None or each.object_id in asked) and not _recognised(each, own.least_weight)
-    ]
+    may = [each for each in result.objects if asked is None or each.object_id in asked]
+    doubtful = [each.object_id for each in may if not _recognised(each, own.least_weight)]
     whole = [each.object_id for each in result.objects if _is_one(each, own.least_weight)]
     tries = Tries(result, prior, again, config)
     masks = other_masks(frame, doubtful, aside, config, result.seed, whole)
@@ -70,7 +67,7 @@ def _one_round(
     free = np.isin(frame.segmap, doubtful)
     if aside is not None:
         free |= (aside != BACKGROUND) & (frame.segmap == BACKGROUND)
-    known = tries.known(doubtful) if free.any() else []
+    known = tries.known(may) if free.any() else []
     seeds = sorted([*found, *known], key=lambda each: -each.weight)
     found += tries.found(tries.grown(seeds, masks, free))
     taken = chosen([each for each in found if tries.fits(each)], tries)

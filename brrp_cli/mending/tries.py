@@ -7,7 +7,7 @@ doubt: a mask that was made of what an object explains is always well explained 
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,7 +19,7 @@ from brrp_cli.frames.frame import BACKGROUND, Frame
 from brrp_cli.mending.again import Again
 from brrp_cli.mending.explain import explained
 from brrp_cli.prior.store import Prior
-from brrp_cli.reconstruction import Reconstruction
+from brrp_cli.reconstruction import ObjectReconstruction, Reconstruction
 from brrp_cli.segmentation.other_masks import OtherMask
 
 Mask = NDArray[np.bool_]
@@ -83,9 +83,8 @@ class Tries:
         own = self.config.regroup
         return each.weight >= (own.sure if each.mask.cut else own.whole)
 
-    def known(self, asked: Collection[int]) -> list[Found]:
-        """Objects of the frame that are recognised, in the masks that they have, but for those of
-        the ids `asked`."""
+    def known(self, objects: Sequence[ObjectReconstruction]) -> list[Found]:
+        """Those of the frame's objects that are recognised, in the masks that they have."""
         frame, least = self.result.frame, self.config.regroup.least_weight
         return [
             Found(
@@ -93,9 +92,8 @@ class Tries:
                 float(placed.weight or 0.0),
                 explained(placed, self.prior, frame, self.config.mend),
             )
-            for each in self.result.objects
-            if each.object_id not in asked
-            and (placed := each.recognised) is not None
+            for each in objects
+            if (placed := each.recognised) is not None
             and placed.T_cam_object is not None
             and (placed.weight or 0.0) >= least
         ]

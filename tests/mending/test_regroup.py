@@ -111,18 +111,30 @@ def test_what_is_regrouped_has_a_mesh_and_what_stayed_is_what_it_was(first, mend
     assert stranger is kept[STRANGE_ID] and stranger.recognised is None
 
 
-def test_an_object_whose_parts_lie_in_two_masks_is_found_by_what_it_explains(given, truth, prior):
+@pytest.fixture(scope="module")
+def mixed(given, truth):
     """The rest of the box shares a mask with the can: neither mask, nor both, is of one thing."""
     box, columns = truth.segmap == 1, np.broadcast_to(np.arange(truth.shape[1]), truth.shape)
     rest = box & (columns > np.quantile(columns[box], 0.6))
     segmap = np.select([rest | (truth.segmap == 2), box], [BOTH, BOX], 0)
-    mixed = truth.with_masks(segmap)
-    again = Again(partial(reconstruct, **given), partial(try_masks, **given))
-    result = mend(reconstruct(mixed, **given), prior, again, SegmentConfig())
+    return reconstruct(truth.with_masks(segmap), **given)
+
+
+def test_an_object_whose_parts_lie_in_two_masks_is_found_by_what_it_explains(
+    mixed, truth, prior, again
+):
+    result = mend(mixed, prior, again, SegmentConfig())
     found = {taken: i for i, taken in taken_for(result).items()}
     for true_id, name in ((1, "red_box"), (2, "red_can")):
         mine, mask = result.frame.segmap == found[name], truth.segmap == true_id
         assert (mine & mask).sum() > 0.9 * (mine | mask).sum(), name
+
+
+def test_a_mask_that_is_not_asked_about_does_not_grow(mixed, prior, again):
+    assert taken_for(mixed)[BOX] == "red_box"
+    result = regroup(mixed, prior, again, SegmentConfig(), None, [BOTH])
+    before, now = (each.frame.segmap == BOX for each in (mixed, result))
+    assert (before == now).all()
 
 
 def test_two_halves_need_less_weight_than_one_part(first, prior, again, frame, truth):
