@@ -56,8 +56,8 @@ class RegroupConfig:
     explained : part of a tried mask that the object explains as it was placed, at least; within :
         part of what it explains of all masks that lies in that one
     grown : masks made of what an object explains that are tried in a round at most; closing :
-        pixels, half the width of gaps in them that are closed; least_share : of such a mask that
-        is of one of those before
+        pixels, half the width of gaps in them that are closed; least_share : of such a mask, that
+        it takes from another one at least
     reach, gap : pixels and metres in depth within which masks are neighbours
     least_pixels : with depth, of a mask that is tried; least_cut : of one that is cut
     colours : numbers of groups of pixels that are alike in colour and place; places : what a pixel
