@@ -8,6 +8,7 @@ from functools import partial
 import numpy as np
 import pytest
 from painted_scene import STRANGE, THINGS, photograph, write_things
+from scipy.ndimage import binary_dilation
 
 from brrp_cli import Reconstructor
 from brrp_cli.api import reconstruct, try_masks
@@ -135,6 +136,16 @@ def test_a_mask_that_is_not_asked_about_does_not_grow(mixed, prior, again):
     result = regroup(mixed, prior, again, SegmentConfig(), None, [BOTH])
     before, now = (each.frame.segmap == BOX for each in (mixed, result))
     assert (before == now).all()
+
+
+def test_a_rim_around_what_is_cut_stays_with_it(given, truth, prior, again):
+    both = np.isin(truth.segmap, [2, 3])
+    rimmed = truth.with_masks(np.where(binary_dilation(both, iterations=2), BOTH, 0))
+    few = SegmentConfig(regroup=replace(RegroupConfig(), least_pixels=40))
+    result = regroup(reconstruct(rimmed, **given), prior, again, few)
+    assert set(taken_for(result).values()) == {"red_can", "yellow_ball"}
+    assert len(result.objects) == 2
+    assert ((result.frame.segmap > 0) == (rimmed.segmap > 0)).all()
 
 
 def test_two_halves_need_less_weight_than_one_part(first, prior, again, frame, truth):
