@@ -10,6 +10,7 @@ from brrp_cli.frames.frame import Frame
 from brrp_cli.geometry import backproject, project, transform_points
 from brrp_cli.prior.store import Prior
 from brrp_cli.reconstruction import Retrieved
+from brrp_cli.segmentation.mend_masks import explained_pixels
 
 Mask = NDArray[np.bool_]
 
@@ -51,7 +52,6 @@ def measured(frame: Frame) -> NDArray[np.floating]:
 
 def explained(found: Retrieved, prior: Prior, frame: Frame, config: MendConfig) -> Mask:
     """Pixels (H, W) whose measured depth the object explains as it was placed."""
-    depth = rendered(found, prior, frame)
-    with np.errstate(invalid="ignore"):
-        near = np.abs(depth - measured(frame)) < tolerance(frame, config)
-    return np.asarray((depth > 0) & near)
+    return explained_pixels(
+        rendered(found, prior, frame), measured(frame), tolerance(frame, config)
+    )

@@ -68,8 +68,7 @@ def _one_round(
     if aside is not None:
         free |= (aside != BACKGROUND) & (frame.segmap == BACKGROUND)
     known = tries.known(may) if free.any() else []
-    seeds = sorted([*found, *known], key=lambda each: -each.weight)
-    found += tries.found(tries.grown(seeds, masks, free))
+    found += tries.found(tries.grown([*found, *known], masks, free))
     taken = chosen([each for each in found if tries.fits(each)], tries)
     if not taken:
         return result

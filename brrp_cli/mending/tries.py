@@ -102,13 +102,10 @@ class Tries:
         self, found: Sequence[Found], tried: Sequence[OtherMask], free: Mask
     ) -> list[OtherMask]:
         """Masks of what objects of little doubt explain of the pixels `free` (H, W) and of their
-        own mask, but for those that are nearly one that was tried.
-
-        found : the less in doubt of them first
-        """
+        own mask, the least in doubt first, but for those that are nearly one that was tried."""
         frame, own = self.result.frame, self.config.regroup
         more: list[OtherMask] = []
-        for each in found:
+        for each in sorted(found, key=lambda each: -each.weight):
             if each.weight < own.whole or len(more) == own.grown:
                 break
             mask = _grown(each, free, frame, own.closing, own.least_share)

@@ -64,7 +64,7 @@ def mend_masks(
     """
     found = segmap.copy()
     seen = np.isfinite(depth) & (depth > 0)
-    explained = {p.object_id: _explained(p, depth, seen, tolerance) for p in placed}
+    explained = {p.object_id: explained_pixels(p.depth, depth, tolerance) for p in placed}
     trusted = sorted(
         (p for p in placed if _trusted(p, segmap, seen, explained[p.object_id], config)),
         key=lambda p: (-p.weight, -int(explained[p.object_id].sum())),
@@ -88,14 +88,13 @@ def mend_masks(
     return Mended(found, tuple(changed))
 
 
-def _explained(
-    p: Placed,
-    depth: NDArray[np.floating],
-    seen: Mask,
-    tolerance: NDArray[np.floating],
+def explained_pixels(
+    rendered: NDArray[np.floating], depth: NDArray[np.floating], tolerance: NDArray[np.floating]
 ) -> Mask:
+    """Pixels (H, W) whose measured depth an object explains, which has the depth `rendered` there,
+    0 where it would not be seen. depth : NaN = no return; all (H, W), metres"""
     with np.errstate(invalid="ignore"):
-        return np.asarray(seen & (p.depth > 0) & (np.abs(p.depth - depth) < tolerance))
+        return np.asarray((rendered > 0) & (np.abs(rendered - depth) < tolerance))
 
 
 def _trusted(

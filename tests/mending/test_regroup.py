@@ -214,11 +214,11 @@ def test_nothing_is_tried_where_no_try_is_allowed(first, prior, aside):
 
 
 @pytest.mark.parametrize(
-    "known",
+    "told",
     [{"similar": [Similar("red_can", 0.9, np.ones(3))]}, {"unknown_weight": 0.1}],
     ids=["stretched", "one stored object or another"],
 )
-def test_what_is_one_thing_is_not_cut(first, prior, again, known):
+def test_what_is_one_thing_is_not_cut(first, prior, again, told):
     """It may still be a part of something larger."""
     tried = []
 
@@ -227,7 +227,7 @@ def test_what_is_one_thing_is_not_cut(first, prior, again, known):
         return again.masks(frame, masks, trial, **known)
 
     spied = Again(again.objects, masks)
-    like = [replace(item, **known) if item.object_id == BOTH else item for item in first.objects]
+    like = [replace(item, **told) if item.object_id == BOTH else item for item in first.objects]
     regroup(first, prior, spied, SegmentConfig(), None, [BOTH])
     regroup(replace(first, objects=like), prior, spied, SegmentConfig(), None, [BOTH])
     assert len(tried) == 1 and tried[0]
