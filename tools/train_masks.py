@@ -50,6 +50,12 @@ SETS = f"SCENES or SCENES:{MEASURED}"
 @click.option("--batch", default=8, show_default=True, type=click.IntRange(1), help="Views.")
 @click.option("--rate", default=3e-3, show_default=True, type=float, help="Of AdamW.")
 @click.option(
+    "--precision",
+    default="float32",
+    show_default=True,
+    type=click.Choice(["float32", "bfloat16"]),
+)
+@click.option(
     "--validation",
     default=0.04,
     show_default=True,
@@ -73,6 +79,7 @@ def main(
     cooling: int,
     batch: int,
     rate: float,
+    precision: str,
     validation: float,
     begin: Path | None,
     seed: int,
@@ -118,7 +125,14 @@ def main(
                 found=f"{len(train)} and {len(held)} views",
                 fix="name SETS to make examples of, or more of them",
             )
-        config = TrainingConfig(epochs=epochs, cooling=cooling, batch=batch, rate=rate, seed=seed)
+        config = TrainingConfig(
+            epochs=epochs,
+            cooling=cooling,
+            batch=batch,
+            rate=rate,
+            seed=seed,
+            precision=precision,
+        )
         network = started(AffinityNetworkConfig(), seed) if begin is None else resumed(begin)
         training = Training(network, config, output, len(train))
         finished = run_watched(training, train, held, late)

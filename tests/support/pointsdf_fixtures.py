@@ -91,6 +91,6 @@ def _train(place: Place, steps: int) -> None:
     for number in range(steps):
         # Falling to 0, so that few steps suffice.
         training.optimizer.param_groups[0]["lr"] = RATE * (1 - number / steps)
-        training.step(place.examples, eight, number)
+        training.step(training.drawn(place.examples, eight, number), number)
     training.settle(place.examples, [eight] * 16)
     save_weights(training.network, about, place.weights, half=True)

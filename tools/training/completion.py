@@ -21,6 +21,9 @@ from brrp_cli.seeds import child_seed
 from training.completion_examples import Examples
 from training.epochs import EpochsConfig, EpochTraining
 
+# Volumes, lengths, places, and what lies inside.
+Batch = tuple[Tensor, Tensor, Tensor, Tensor]
+
 BEST = "best.pt"
 # Of the loss of the volume's features alone: the U-Net learns shapes sooner.
 ALONE = 0.3
@@ -69,7 +72,7 @@ def resumed(path: Path) -> ShapeNetwork:
     return found
 
 
-class Training(EpochTraining[Examples]):
+class Training(EpochTraining[Examples, Batch]):
     """A training whose best epoch, that with the least loss on held-out shapes, is in best.pt.
 
     begun : what it begins as
@@ -90,9 +93,13 @@ class Training(EpochTraining[Examples]):
         self.jitter = torch.full((begun.config.lengths,), JITTER)
         self.jitter[-WHOLE:] = JITTER_WHOLE
 
-    def learn(self, train: Examples, rows: NDArray[np.int64], rng: np.random.Generator) -> float:
-        """Learn from these objects, and give the loss on them."""
-        volumes, lengths, places, inside = draw_batch(train, rows, self.config.points, rng)
+    def draw(self, train: Examples, rows: NDArray[np.int64], rng: np.random.Generator) -> Batch:
+        """Of these objects, as `draw_batch` gives it."""
+        return draw_batch(train, rows, self.config.points, rng)
+
+    def learn(self, batch: Batch) -> float:
+        """Learn from what was drawn, and give the loss on it."""
+        volumes, lengths, places, inside = batch
         network = self.network.train()
         self.optimizer.zero_grad()
         found = network.at(network.encode(volumes), places)
@@ -127,7 +134,7 @@ class Training(EpochTraining[Examples]):
 
 def draw_batch(
     examples: Examples, rows: NDArray[np.int64], points: int, rng: np.random.Generator
-) -> tuple[Tensor, Tensor, Tensor, Tensor]:
+) -> Batch:
     """Volumes (B, CHANNELS, n, n, n), lengths (B, Q, 72), places (B, Q, 3), inside (B, Q).
 
     Every second object is mirrored, left and right: its lengths stay as they are.

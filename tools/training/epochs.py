@@ -9,7 +9,8 @@ from __future__ import annotations
 
 import json
 from abc import ABC, abstractmethod
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from time import monotonic
@@ -51,9 +52,10 @@ class _Examples(Protocol):
 
 
 E = TypeVar("E", bound=_Examples)
+B = TypeVar("B")
 
 
-class EpochTraining(ABC, Generic[E]):
+class EpochTraining(ABC, Generic[E, B]):
     """A training in a folder: checkpoint.pt, history.json, and what `keep` writes of the epoch
     whose record has the least `CRITERION`.
 
@@ -100,12 +102,12 @@ class EpochTraining(ABC, Generic[E]):
         while state.epoch < self.config.epochs:
             start = monotonic()
             batches = self.batches(len(train), state.epoch)
-            for step in range(state.step, len(batches)):
+            for step, batch in self._all_drawn(train, batches):
                 if not go_on():
                     self.save()
                     return False
                 self.set_rate(step, len(batches))
-                state.losses.append(self.step(train, batches[step], step))
+                state.losses.append(self.step(batch, step))
                 state.step += 1
                 stepped(state.losses[-1])
                 if state.step % every == 0:
@@ -125,14 +127,37 @@ class EpochTraining(ABC, Generic[E]):
             ended(record)
         return True
 
-    def step(self, train: E, rows: NDArray[np.int64], number: int) -> float:
-        """Step `number` of this epoch, on these rows; gives its loss."""
+    def step(self, batch: B, number: int) -> float:
+        """Step `number` of this epoch, on what was drawn for it; gives its loss."""
         torch.manual_seed(child_seed(self.config.seed, "dropout", self.progress.epoch, number))
-        return self.learn(train, rows, self.rng("step", number))
+        return self.learn(batch)
+
+    def drawn(self, train: E, rows: NDArray[np.int64], number: int) -> B:
+        """What step `number` of this epoch learns from, of these rows."""
+        return self.draw(train, rows, self.rng("step", number))
+
+    def _all_drawn(self, train: E, batches: list[NDArray[np.int64]]) -> Iterator[tuple[int, B]]:
+        """The steps that are left of this epoch, and what each learns from, which is drawn while
+        the one before learns."""
+
+        def draw(step: int) -> B:
+            return self.drawn(train, batches[step], step)
+
+        steps = range(self.progress.step, len(batches))
+        with ThreadPoolExecutor(1) as pool:
+            drawn = [pool.submit(draw, step) for step in steps[:1]]
+            for step in steps:
+                batch = drawn.pop().result()
+                drawn += [pool.submit(draw, step + 1)] if step + 1 in steps else []
+                yield step, batch
 
     @abstractmethod
-    def learn(self, train: E, rows: NDArray[np.int64], rng: np.random.Generator) -> float:
-        """Learn from these rows, and give the loss on them."""
+    def draw(self, train: E, rows: NDArray[np.int64], rng: np.random.Generator) -> B:
+        """What a step learns from, of these rows. Another thread may be learning meanwhile."""
+
+    @abstractmethod
+    def learn(self, batch: B) -> float:
+        """Learn from what was drawn, and give the loss on it."""
 
     @abstractmethod
     def scores(self, held: E) -> dict[str, float]:

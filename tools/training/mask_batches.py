@@ -12,6 +12,9 @@ from torch.nn.functional import avg_pool2d, interpolate
 from brrp_cli.segmentation.image_channels import CHANNELS, COLOURS, NORMALS, SIDEWAYS
 from training.mask_examples import Examples
 
+# Channels and labels.
+Batch = tuple[Tensor, Tensor]
+
 # Times that images are drawn larger or smaller.
 ZOOM = (0.6, 1.5)
 # How often: depth has holes, colours are greys, all one, blurred, light falls in spots, or from one
@@ -27,7 +30,7 @@ BRIGHTNESS, TINT, GAMMA, NOISE = 0.35, 0.12, 0.3, 0.04
 
 def draw_batch(
     examples: Examples, rows: NDArray[np.int64], size: tuple[int, int], rng: np.random.Generator
-) -> tuple[Tensor, Tensor]:
+) -> Batch:
     """Channels (B, CHANNELS, *size) and labels (B, *size) of these examples: a window of each."""
     found = [_window(examples, int(row), size, rng) for row in rows]
     channels = np.stack([each[0] for each in found]).astype(np.float32) / np.float32(63)

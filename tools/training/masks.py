@@ -21,7 +21,7 @@ from brrp_cli.segmentation.affinity_network import (
 from brrp_cli.segmentation.learned_affinities import load_affinity_network
 from brrp_cli.segmentation.pixel_pairs import windows
 from training.epochs import EpochsConfig, EpochTraining
-from training.mask_batches import draw_batch
+from training.mask_batches import Batch, draw_batch
 from training.mask_examples import Examples
 
 BEST = "best.pt"
@@ -34,7 +34,11 @@ OBJECT = 0.5
 
 @dataclass(frozen=True)
 class TrainingConfig(EpochsConfig):
-    """How to train (AdamW, binary cross-entropy). size : rows and columns of the windows"""
+    """How to train (AdamW, binary cross-entropy).
+
+    size : rows and columns of the windows
+    precision : "float32" or "bfloat16", of the products; weights are float32 either way
+    """
 
     epochs: int = 10
     cooling: int = 9
@@ -43,6 +47,7 @@ class TrainingConfig(EpochsConfig):
     warming: int = 100
     size: tuple[int, int] = (192, 256)
     decay: float = 0.02
+    precision: str = "float32"
 
 
 def started(config: AffinityNetworkConfig, seed: int) -> AffinityNetwork:
@@ -67,18 +72,20 @@ def pairs(labels: Tensor, offset: tuple[int, int]) -> tuple[Tensor, Tensor, tupl
 def loss_of(logits: Tensor, labels: Tensor) -> Tensor:
     """The loss of logits (B, len(OFFSETS) + 1, h, w) for labels (B, h, w): pairs of the table are
     not asked for."""
-    total = OBJECT * cross_entropy(logits[:, -1], (labels > 0).float())
-    for index, offset in enumerate(OFFSETS):
+    # Unbound: the gradient of a slice would be as large as all of them.
+    *same_logits, object_logits = logits.unbind(1)
+    total = OBJECT * cross_entropy(object_logits, (labels > 0).float())
+    for said, offset in zip(same_logits, OFFSETS, strict=True):
         first, second, window = pairs(labels, offset)
         both = (first > 0) & (second > 0)
         same = first == second
         weight = torch.where(both & ~same, APART, 1.0) * ((first > 0) | (second > 0))
-        each = cross_entropy(logits[:, index][:, *window], same.float(), weight, reduction="sum")
+        each = cross_entropy(said[:, *window], same.float(), weight, reduction="sum")
         total = total + each / weight.sum().clamp_min(1) / len(OFFSETS)
     return total
 
 
-class Training(EpochTraining[Examples]):
+class Training(EpochTraining[Examples, Batch]):
     """A training whose best epoch, that with the least loss on held scenes, is in best.pt."""
 
     CRITERION = "held_loss"
@@ -91,12 +98,18 @@ class Training(EpochTraining[Examples]):
         optimizer = torch.optim.AdamW(begun.parameters(), config.rate, weight_decay=config.decay)
         super().__init__(config, begun, optimizer, folder, {**asdict(begun.config), "views": views})
 
-    def learn(self, train: Examples, rows: NDArray[np.int64], rng: np.random.Generator) -> float:
-        """Learn from these views, and give the loss on them."""
-        channels, labels = draw_batch(train, rows, self.config.size, rng)
+    def draw(self, train: Examples, rows: NDArray[np.int64], rng: np.random.Generator) -> Batch:
+        """Channels and labels of windows of these views."""
+        return draw_batch(train, rows, self.config.size, rng)
+
+    def learn(self, batch: Batch) -> float:
+        """Learn from what was drawn, and give the loss on it."""
+        channels, labels = batch
         self.network.train()
         self.optimizer.zero_grad()
-        loss = loss_of(self.network(channels), labels)
+        with torch.autocast("cpu", torch.bfloat16, enabled=self.config.precision == "bfloat16"):
+            logits = self.network(channels)
+        loss = loss_of(logits.float(), labels)
         loss.backward()
         torch.nn.utils.clip_grad_norm_(self.network.parameters(), 1.0)
         self.optimizer.step()

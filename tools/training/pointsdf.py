@@ -19,6 +19,9 @@ from brrp_cli.seeds import child_rng, child_seed
 from training.epochs import EpochsConfig, EpochTraining
 from training.examples import Examples
 
+# Clouds, queries and labels.
+Batch = tuple[Tensor, Tensor, Tensor]
+
 LEVEL = 0.3
 SETTLING = 32  # batches
 
@@ -51,7 +54,7 @@ def narrowed(config: NetworkConfig, width: float) -> NetworkConfig:
     return replace(config, features=features, hidden=fewer(config.hidden))
 
 
-class Training(EpochTraining[Examples]):
+class Training(EpochTraining[Examples, Batch]):
     """A training that writes its best epoch to the file `weights`.
 
     about : what the weights' file is to say of the examples, plain JSON; device : torch's name
@@ -111,7 +114,7 @@ class Training(EpochTraining[Examples]):
         torch.manual_seed(child_seed(self.config.seed, "settle", self.progress.epoch))
         with torch.no_grad():
             for number, rows in enumerate(batches[:SETTLING]):
-                clouds, queries, _ = self._draw(train, rows, self.rng("settle", number))
+                clouds, queries, _ = self.draw(train, rows, self.rng("settle", number))
                 self.network(clouds.to(self.device), queries.to(self.device))
         for hook in hooks:
             hook.remove()
@@ -122,9 +125,14 @@ class Training(EpochTraining[Examples]):
             layer.running_mean.copy_(torch.stack(means).mean(dim=0))
             layer.running_var.copy_(torch.stack(variances).mean(dim=0))
 
-    def learn(self, train: Examples, rows: NDArray[np.int64], rng: np.random.Generator) -> float:
-        """Learn from these rows, and give the loss on them."""
-        clouds, queries, labels = self._draw(train, rows, rng)
+    def draw(self, train: Examples, rows: NDArray[np.int64], rng: np.random.Generator) -> Batch:
+        """Clouds, queries and labels of these rows."""
+        noise = self.config.noise / self.network.config.scale
+        return draw_batch(train, rows, self.config.queries, noise, rng)
+
+    def learn(self, batch: Batch) -> float:
+        """Learn from what was drawn, and give the loss on it."""
+        clouds, queries, labels = batch
         self.network.train()
         self.optimizer.zero_grad()
         half = self.config.precision == "bfloat16"
@@ -135,12 +143,6 @@ class Training(EpochTraining[Examples]):
         self.optimizer.step()
         return float(loss.detach())
 
-    def _draw(
-        self, train: Examples, rows: NDArray[np.int64], rng: np.random.Generator
-    ) -> tuple[Tensor, Tensor, Tensor]:
-        noise = self.config.noise / self.network.config.scale
-        return draw_batch(train, rows, self.config.queries, noise, rng)
-
 
 def draw_batch(
     examples: Examples,
@@ -148,7 +150,7 @@ def draw_batch(
     queries: int,
     noise: float,
     rng: np.random.Generator,
-) -> tuple[Tensor, Tensor, Tensor]:
+) -> Batch:
     """Noisy clouds (B, P, 3), queries (B, Q, 3) and labels (B, Q), float32.
 
     noise : in units of the clouds; a noisy cloud is moved so that the middle of its bounding box is

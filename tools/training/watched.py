@@ -22,7 +22,7 @@ def told(record: dict[str, float]) -> str:
 
 
 def run_watched(
-    training: EpochTraining[Any],
+    training: EpochTraining[Any, Any],
     train: Any,
     held: Any,
     late: Callable[[], bool],

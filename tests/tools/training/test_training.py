@@ -182,11 +182,11 @@ def test_settled_statistics_answer_as_the_training_did(place, tmp_path):
     work = Training(replace(SMALL, dropout=0.0), config, tmp_path, tmp_path / "w.safetensors", {})
     rows = np.arange(8)
     for number in range(3):
-        work.step(place.examples, rows, number)
+        work.step(work.drawn(place.examples, rows, number), number)
     lagging = evaluate(work.network, place.examples, 8, "cpu")["validation_loss"]
     work.settle(place.examples, [rows])
     settled = evaluate(work.network, place.examples, 8, "cpu")["validation_loss"]
-    trained = work.step(place.examples, rows, 3)
+    trained = work.step(work.drawn(place.examples, rows, 3), 3)
     # A cloud's middle is 0 up to half precision, and is moved there when it is drawn.
     assert settled == pytest.approx(trained, rel=0.01)
     assert abs(settled - trained) < 0.2 * abs(lagging - trained)
