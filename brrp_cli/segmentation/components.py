@@ -13,8 +13,8 @@ def find_parts(
     mask: NDArray[np.bool_], boundary: NDArray[np.float64], config: ComponentsConfig
 ) -> NDArray[np.int64]:
     """Labels (H, W), 1, 2, ..., of parts of the mask: each grows from a calm middle to the ridges
-    of the boundary (H, W), 0 to 1. What holds no calm middle is one part if it hangs together, and
-    0 if it is smaller than that too."""
+    of the boundary (H, W), 0 to 1. What no middle grows into is one part if it hangs together, and
+    0 if it is smaller than a middle, too."""
     ndimage = import_library("scipy.ndimage")
     segmentation = import_library("skimage.segmentation")
     calm = mask & (boundary < config.calm)
@@ -22,13 +22,11 @@ def find_parts(
     cores = _large(
         ndimage.label(ndimage.binary_erosion(calm, border_value=1))[0], config.least_core
     )
-    # Thin things have no pixel that is far from an edge, and are whole parts of the mask.
-    whole, _ = ndimage.label(mask, structure=np.ones((3, 3)))
-    holding = np.unique(whole[cores > 0])
-    thin = _large(np.where(np.isin(whole, holding), 0, whole), config.least_core)
-    markers = np.where(thin > 0, thin + cores.max(), cores)
-    grown = segmentation.watershed(boundary, markers, mask=mask)
-    return np.asarray(grown, dtype=np.int64)
+    grown = np.asarray(segmentation.watershed(boundary, cores, mask=mask), dtype=np.int64)
+    # Thin things have no pixel that is far from an edge, and may touch others by a corner alone.
+    left, _ = ndimage.label(mask & (grown == 0), structure=np.ones((3, 3)))
+    thin = _large(left, config.least_core)
+    return np.where(thin > 0, thin + cores.max(), grown)
 
 
 def split_at_strongest(

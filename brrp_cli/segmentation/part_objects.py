@@ -17,10 +17,12 @@ from brrp_cli.segmentation.seen_surfaces import SeenSurfaces
 
 @dataclass(frozen=True)
 class Parted:
-    """labels : (H, W), 1, 2, ..., 0 = none; border : (H, W) 0 to 1, that one thing ends there"""
+    """labels : (H, W), 1, 2, ..., 0 = none; border : (H, W) 0 to 1, that one thing ends there;
+    object : (H, W) probability that a pixel shows one"""
 
     labels: NDArray[np.int64]
     border: NDArray[np.float64]
+    object: NDArray[np.float32]
 
 
 def part_objects(
@@ -36,4 +38,8 @@ def part_objects(
     border = borders_of(affinities)
     parts = find_parts(mask, border, config.components)
     labels = affinities.enlarge(join_alike_pixels(parts, affinities, config.alike))
-    return Parted(np.where(risen, labels, 0), affinities.enlarge(border))
+    return Parted(
+        np.where(risen, labels, 0),
+        affinities.enlarge(border),
+        affinities.enlarge(affinities.object),
+    )

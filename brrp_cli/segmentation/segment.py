@@ -19,7 +19,7 @@ from brrp_cli.segmentation.components import absorb_small
 from brrp_cli.segmentation.fill_concavities import fill_inside
 from brrp_cli.segmentation.join_insides import join_insides
 from brrp_cli.segmentation.left_out import EDGE, IN_THE_AIR, left_out, told
-from brrp_cli.segmentation.part_objects import part_objects
+from brrp_cli.segmentation.part_objects import Parted, part_objects
 from brrp_cli.segmentation.refine_borders import refine_borders
 from brrp_cli.segmentation.region_growing import fill_holes, grow
 from brrp_cli.segmentation.rising import rising
@@ -61,22 +61,21 @@ def segment_and_aside(
         parted.labels, seen.plan, seen.height, table.plan(seen.normals), config.insides
     )
     objects = split_stacks(objects, frame.rgb, seen.height, config.stacks)
-    small = _areas(objects, frame) < config.min_area
-    segmap = absorb_small(objects, parted.border, small)
+    segmap = absorb_small(objects, parted.border, ~_are_large(objects, frame, parted, config))
     # Pixels at edges, which were left out of the smoothed depth, join what they lie next to.
     edges = frame.valid & ~seen.valid
     edges &= table.plane.signed_distance(frame.points) > config.rim * rises.lift
     points = np.where(edges[..., None], frame.points, points)
     segmap = grow(segmap, points, rises.rim | edges, config.reach)
     # Specks would grow with their borders.
-    segmap = _large(segmap, frame, config.min_area)
+    segmap = _large(segmap, frame, parted, config)
     filled = fill_inside(segmap, table.plan(points), rises.floor, config.concavities)
     segmap = refine_borders(filled, frame.rgb, filled != segmap, config.borders)
-    segmap = fill_holes(segmap, ~frame.valid)
+    segmap = _large(fill_holes(segmap, ~frame.valid), frame, parted, config)
     aside = np.zeros_like(segmap)
     if not keep_all:
         segmap, aside = _without(segmap, frame, table, config)
-    return _numbered(segmap, frame, config.min_area), aside
+    return _numbered(segmap, frame, config), aside
 
 
 def _without(
@@ -84,7 +83,6 @@ def _without(
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """The masks without those that are left out, which the log tells, and of the latter those that
     may be whole objects."""
-    segmap = _large(segmap, frame, config.min_area)
     points = np.where(frame.valid[..., None], frame.points, np.nan)
     height = table.plane.signed_distance(points)
     over, masked = np.zeros(frame.shape, dtype=bool), (segmap > 0) & frame.valid
@@ -105,26 +103,40 @@ def _areas(segmap: NDArray[np.int64], frame: Frame) -> NDArray[np.float64]:
     return np.asarray(np.bincount(segmap.ravel(), weights=area.ravel()), dtype=np.float64)
 
 
-def _large(segmap: NDArray[np.int64], frame: Frame, min_area: float) -> NDArray[np.int64]:
-    """The masks that show so many metres squared of themselves."""
-    return np.where(_areas(segmap, frame)[segmap] >= min_area, segmap, BACKGROUND)
+def _sure(segmap: NDArray[np.int64], parted: Parted, config: SegmentConfig) -> NDArray[np.bool_]:
+    """(n + 1,) whether the network takes each label for an object with little doubt."""
+    sums = np.bincount(segmap.ravel(), parted.object.ravel())
+    return np.asarray(sums > config.sure * np.bincount(segmap.ravel()))
 
 
-def _numbered(segmap: NDArray[np.int64], frame: Frame, min_area: float) -> NDArray[np.int64]:
-    """The masks without small ones, numbered by the column of their middle."""
-    areas = _areas(segmap, frame)
+def _are_large(
+    segmap: NDArray[np.int64], frame: Frame, parted: Parted, config: SegmentConfig
+) -> NDArray[np.bool_]:
+    """(n + 1,) whether each label shows so much of itself that it is no speck."""
+    least = np.where(_sure(segmap, parted, config), config.sure_area, config.min_area)
+    return np.asarray(_areas(segmap, frame) >= least)
+
+
+def _large(
+    segmap: NDArray[np.int64], frame: Frame, parted: Parted, config: SegmentConfig
+) -> NDArray[np.int64]:
+    """The masks that are no specks."""
+    large = _are_large(segmap, frame, parted, config)
+    return np.where(large[segmap], segmap, BACKGROUND)
+
+
+def _numbered(segmap: NDArray[np.int64], frame: Frame, config: SegmentConfig) -> NDArray[np.int64]:
+    """The masks numbered by the column of their middle. Errors: FrameError without any."""
     columns = np.broadcast_to(np.arange(frame.shape[1]), frame.shape)
     middles = {
-        int(i): float(columns[segmap == i].mean())
-        for i in np.flatnonzero(areas >= min_area)
-        if i != BACKGROUND
+        int(i): float(columns[segmap == i].mean()) for i in np.unique(segmap) if i != BACKGROUND
     }
     if not middles:
         raise FrameError(
             "Nothing stands on the table",
             where=frame.source,
             expected="objects that rise above their support plane",
-            found=f"none that shows {min_area * 1e4:g} cm^2 of itself",
+            found=f"none that shows {config.min_area * 1e4:g} cm^2 of itself",
             fix="check the unit of depth (--depth-scale), move the camera nearer, keep what the"
             " image's border cuts (--all), or pass masks with --masks",
         )

@@ -95,6 +95,16 @@ def test_parts_end_at_boundaries_and_at_necks():
     assert parts[6, 6] != parts[6, 30]
 
 
+def test_a_thin_thing_that_touches_another_by_a_corner_is_a_part():
+    mask = np.zeros((60, 60), bool)
+    mask[2:18, 2:18] = True
+    line = np.zeros_like(mask)
+    line[np.arange(18, 58), np.arange(18, 58)] = True
+    parts = find_parts(mask | line, np.zeros(mask.shape), PARTS)
+    assert len(np.unique(parts[mask])) == len(np.unique(parts[line])) == 1
+    assert 0 < parts[4, 4] != parts[25, 25] > 0
+
+
 def test_small_parts_join_the_neighbour_that_no_wall_parts_them_from():
     parts = np.repeat([[1] * 10 + [2] * 2 + [3] * 10], 8, axis=0)
     wall = np.zeros(parts.shape)
