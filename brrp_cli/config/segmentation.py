@@ -132,12 +132,14 @@ class ConcavitiesConfig:
 
     cell : metres of the plan's grid; sectors : directions that are looked into; around : those of
     them that hold the object; wall : metres that an inside keeps from the hull of the walls
+    object : probability from which on the network may be right that it shows an object
     """
 
     cell: float = 0.004
     sectors: int = 12
     around: int = 8
     wall: float = 0.008
+    object: float = share(0.5)
 
 
 @dataclass(frozen=True)

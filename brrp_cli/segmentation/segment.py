@@ -69,7 +69,9 @@ def segment_and_aside(
     segmap = grow(segmap, points, rises.rim | edges, config.reach)
     # Specks would grow with their borders.
     segmap = _large(segmap, frame, parted, config)
-    filled = fill_inside(segmap, table.plan(points), rises.floor, config.concavities)
+    # The table in a crook or under an arch is none, and what lies around it does not change that.
+    floors = rises.floor & (parted.object > config.concavities.object)
+    filled = fill_inside(segmap, table.plan(points), floors, config.concavities)
     segmap = refine_borders(filled, frame.rgb, filled != segmap, config.borders)
     segmap = _large(fill_holes(segmap, ~frame.valid), frame, parted, config)
     aside = np.zeros_like(segmap)

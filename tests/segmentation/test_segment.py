@@ -14,6 +14,7 @@ from brrp_cli.config.segmentation import (
     BordersConfig,
     ConcavitiesConfig,
     LeftOutConfig,
+    SegmentConfig,
 )
 from brrp_cli.errors import FrameError
 from brrp_cli.frames.build import make_frame
@@ -130,6 +131,16 @@ def test_a_stud_of_its_bricks_colour_is_no_thing_of_its_own(top, count):
 def test_a_thin_thing_is_found():
     frame = boxes(((0.16, 0.04, 0.01), 0, 0, 0))
     assert overlap(segment(frame) == 1, frame.segmap == 1) > 0.6
+
+
+def test_a_small_thing_is_found_where_the_network_is_sure_of_it():
+    frame = boxes(((0.019, 0.019, 0.019), 0, 0, 0), ((0.06, 0.06, 0.06), -0.2, 0, 0))
+    found = segment(frame)
+    assert found.max() == 2
+    assert overlap(found[frame.segmap != 2] > 0, frame.segmap[frame.segmap != 2] == 1) > 0.5
+    doubted = segment(frame, config=replace(SegmentConfig(), sure=1.0))
+    assert doubted.max() == 1
+    assert not (doubted[frame.segmap == 1] > 0).any()
 
 
 def test_a_mug_is_one_thing():
