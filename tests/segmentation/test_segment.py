@@ -153,6 +153,20 @@ def test_a_mug_is_one_thing():
     assert overlap(found == 1, clean.segmap == 1) > 0.75
 
 
+@pytest.mark.parametrize("floor", [0.002, None])
+def test_the_table_within_a_ring_is_no_part_of_it_and_the_floor_of_a_dish_is(floor):
+    outside = trimesh.creation.cylinder(0.09, 0.03, sections=48)
+    inside = trimesh.creation.cylinder(0.075, 0.04, sections=48)
+    if floor is not None:
+        inside.apply_translation([0, 0, 0.005 + floor])
+    thing = in_camera(outside.difference(inside).apply_translation([0, 0, 0.015]), T_CAM_WORLD)
+    clean = photograph({1: thing})
+    depth = noisy(np.nan_to_num(clean.points[..., 2]))
+    frame = make_frame(segmap=clean.segmap, depth=depth, K=clean.K)
+    found = segment(painted(frame, (200, 60, 40)))
+    assert overlap(found == 1, frame.segmap == 1) > 0.75
+
+
 def painted(frame, *colours):
     rgb = np.full((*frame.shape, 3), 120, np.uint8)
     for object_id, colour in enumerate(colours, start=1):
