@@ -69,7 +69,7 @@ def segment_and_aside(
     segmap = grow(segmap, points, rises.rim | edges, config.reach)
     # Specks would grow with their borders.
     segmap = _large(segmap, frame, parted, config)
-    # The table in a crook or under an arch is none, and what lies around it does not change that.
+    # What the network takes for table stays table, whatever stands around it.
     floors = rises.floor & (parted.object > config.concavities.object)
     filled = fill_inside(segmap, table.plan(points), floors, config.concavities)
     segmap = refine_borders(filled, frame.rgb, filled != segmap, config.borders)
