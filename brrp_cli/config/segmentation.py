@@ -250,8 +250,9 @@ class SegmentConfig:
         `sigmas` deviations of the table's own height, which grow with the square of the distance
     rim : pixels that rise that part of it join an object within `reach`
     margin : how far beside the seen table an object may stand
-    min_area : objects that show less of themselves are dropped, metres squared; sure_area : of what
-        the network takes for an object with a probability of `sure`, on average
+    min_area : objects that show less of themselves are dropped, metres squared; sure_part : that
+        part of it is enough of what the network takes for an object with a probability of `sure`,
+        on average
     """
 
     min_height: float = 0.004
@@ -261,7 +262,7 @@ class SegmentConfig:
     reach: float = 0.008
     margin: float = 0.03
     min_area: float = 0.0007
-    sure_area: float = 0.0004
+    sure_part: float = share(0.57)
     sure: float = share(0.7)
     smooth_depth: SmoothDepthConfig = field(default_factory=SmoothDepthConfig)
     table: TableConfig = field(default_factory=TableConfig)

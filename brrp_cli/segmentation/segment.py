@@ -115,7 +115,7 @@ def _are_large(
     segmap: NDArray[np.int64], frame: Frame, parted: Parted, config: SegmentConfig
 ) -> NDArray[np.bool_]:
     """(n + 1,) whether each label shows so much of itself that it is no speck."""
-    least = np.where(_sure(segmap, parted, config), config.sure_area, config.min_area)
+    least = config.min_area * np.where(_sure(segmap, parted, config), config.sure_part, 1.0)
     return np.asarray(_areas(segmap, frame) >= least)
 
 
