@@ -132,7 +132,8 @@ class ConcavitiesConfig:
 
     cell : metres of the plan's grid; sectors : directions that are looked into; around : those of
     them that hold the object; wall : metres that an inside keeps from the hull of the walls
-    object : probability from which on the network may be right that it shows an object
+    object : probability that the network gives a pixel to show an object, at least, for it to be
+        an inside
     """
 
     cell: float = 0.004

@@ -136,6 +136,20 @@ def test_trains_and_goes_on_as_if_it_had_not_stopped(place, tmp_path):
     assert refused.exit_code == 1 and "holds another training" in refused.output
 
 
+def test_products_in_bfloat16_teach_about_the_same(place, tmp_path):
+    losses = []
+    for precision in ("float32", "bfloat16"):
+        folder = tmp_path / precision
+        shutil.copytree(place / "made", folder)
+        result = run("-o", folder, "--epochs", 1, *SMALL, *HELD, "--precision", precision)
+        assert result.exit_code == 0, result.output
+        losses.append(history(folder)[0]["held_loss"])
+        weights = load_affinity_network(folder / "affinities.safetensors").state_dict()
+        assert {each.dtype for each in weights.values()} == {torch.float32}
+    assert losses[0] != losses[1]
+    assert losses[1] == pytest.approx(losses[0], rel=0.05)
+
+
 def test_tells_what_is_missing_and_what_is_not_understood(tmp_path):
     result = run("-o", tmp_path / "out")
     assert result.exit_code == 1 and "too little to train on" in result.output

@@ -52,6 +52,7 @@ class _Examples(Protocol):
 
 
 E = TypeVar("E", bound=_Examples)
+# What a step learns from.
 B = TypeVar("B")
 
 
