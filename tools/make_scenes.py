@@ -1,8 +1,8 @@
 """Make procedural tabletop scenes with ground truth, in the layout that `brrp eval` reads.
 
 PyBullet drops 3 to 10 objects on a table, lets them settle and draws colour, depth buffer and ids
-from random views (0.6 to 1 m away, 25 to 60 degrees above the table). A scene depends on the
-meshes, the seed and its number alone. Needs `pip install .[sim]`.
+from random views. A scene depends on the meshes, the seed and its number alone. Needs
+`pip install .[sim]`.
 
 The three sets of docs/accuracy.md, and the same scenes as a structured-light camera sees them
 (`ycb` is the folder with YCB's archives unpacked, NNN_name/google_16k/textured.obj):
@@ -20,6 +20,8 @@ bleeding silhouettes, steps and holes (docs/sensors.md); it takes the place of `
 what stands where stays as it is.
 `--stack` drops every second object onto the one before it, which stands with its open side up
 where it has one: can on can, jar in bowl. It draws other scenes than a set without it.
+`--distance`, `--elevation` and `--roll` say where cameras stand: `--elevation 70 89` looks down,
+`--distance 0.3 0.5` is a camera at a wrist, which `--roll -180 180` turns about its line of sight.
 
 Objects collide as convex hulls (tools/tabletop/settle.py says what that means). A pixel without a
 return has depth buffer 1.0, the far plane.
@@ -41,6 +43,7 @@ from tqdm import tqdm
 # The script also runs from a checkout that is not installed.
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
+from tabletop.camera import Standpoint
 from tabletop.check import MIN_PIXELS, Distance
 from tabletop.held_out import LEAVE, MIXED, TAKE, chosen
 from tabletop.models import find_meshes
@@ -84,6 +87,30 @@ def _size(_context: click.Context, _option: click.Parameter, value: str) -> tupl
 @click.option("--light", default="plain", show_default=True, type=click.Choice(list(LIGHTS)))
 @click.option("--stack", "stacked", is_flag=True, help="Set objects on and into one another.")
 @click.option("--size", default="640x480", show_default=True, callback=_size)
+@click.option(
+    "--distance",
+    default=Standpoint.distance,
+    show_default=True,
+    nargs=2,
+    type=float,
+    help="Of cameras from the objects' middle, metres.",
+)
+@click.option(
+    "--elevation",
+    default=Standpoint.elevation,
+    show_default=True,
+    nargs=2,
+    type=float,
+    help="Of cameras above the table, degrees.",
+)
+@click.option(
+    "--roll",
+    default=Standpoint.roll,
+    show_default=True,
+    nargs=2,
+    type=float,
+    help="Of cameras about their line of sight, degrees.",
+)
 @click.option("--workers", default=1, show_default=True, type=click.IntRange(1))
 @click.option("--overwrite", is_flag=True, help="Replace scenes that are there.")
 @click.option("--check", is_flag=True, help="Only check every scene of OUTPUT; write nothing.")
@@ -102,6 +129,9 @@ def main(
     light: str,
     stacked: bool,
     size: tuple[int, int],
+    distance: tuple[float, float],
+    elevation: tuple[float, float],
+    roll: tuple[float, float],
     workers: int,
     overwrite: bool,
     check: bool,
@@ -131,7 +161,18 @@ def main(
         if not found[0].is_relative_to(data_root):
             raise click.UsageError(f"{meshes} does not lie below --data-root {data_root}")
         plan = Plan(
-            found, data_root, output, seed, views, noise, size, overwrite, light, sensor, stacked
+            found,
+            data_root,
+            output,
+            seed,
+            views,
+            noise,
+            size,
+            overwrite,
+            light,
+            sensor,
+            stacked,
+            Standpoint(distance, elevation, roll),
         )
         _report(list(_make_all(plan, scenes, workers)), output)
     except BrrpError as error:

@@ -11,8 +11,8 @@ pytest.importorskip("pybullet")
 
 from make_scenes import main
 from tabletop import check
+from tabletop.camera import FAR, NEAR, perspective
 from tabletop.models import find_meshes, load_model
-from tabletop.render import FAR, NEAR, perspective
 from tabletop.scene import Plan, make_scene, noisy_buffer
 from tabletop.settle import drop
 from tabletop.stack import stack

@@ -16,21 +16,12 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from tabletop.camera import Camera
 from tabletop.models import Model
 from tabletop.settle import TABLE_HALF, TABLE_THICKNESS, Pose
 from tabletop.world import World, new_world
 
-NEAR, FAR = 0.1, 5.0  # metres
-FIELD_OF_VIEW = 45.0  # degrees, vertical: as in common RGBD cameras
 NOTHING = 1.0  # depth buffer where there is no return: the far plane
-
-
-@dataclass(frozen=True)
-class Camera:
-    """OpenGL matrices (4, 4) for column vectors: camera from world, clip space from camera."""
-
-    view: NDArray[np.float64]
-    projection: NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -49,40 +40,6 @@ class Picture:
     rgb: NDArray[np.uint8]
     depth: NDArray[np.float32]
     ids: NDArray[np.int32]
-
-
-def draw_camera(
-    center: NDArray[np.float64], size: tuple[int, int], rng: np.random.Generator
-) -> Camera:
-    """A camera 0.6 to 1 m from `center` (3,), 25 to 60 degrees above the table, on any side."""
-    distance = rng.uniform(0.6, 1.0)
-    azimuth, elevation = rng.uniform(0, 2 * np.pi), np.deg2rad(rng.uniform(25, 60))
-    backward = np.array(
-        [
-            np.cos(elevation) * np.cos(azimuth),
-            np.cos(elevation) * np.sin(azimuth),
-            np.sin(elevation),
-        ]
-    )
-    right = np.cross([0.0, 0.0, 1.0], backward)
-    right /= np.linalg.norm(right)
-    view = np.eye(4)
-    view[:3, :3] = right, np.cross(backward, right), backward
-    target = center + rng.uniform(-0.03, 0.03, 3)
-    view[:3, 3] = -view[:3, :3] @ (target + distance * backward)
-    return Camera(view, perspective(size))
-
-
-def perspective(size: tuple[int, int]) -> NDArray[np.float64]:
-    """OpenGL projection (4, 4) for an image of `size` (width, height)."""
-    width, height = size
-    focal = 1 / np.tan(np.deg2rad(FIELD_OF_VIEW) / 2)
-    projection = np.zeros((4, 4))
-    projection[0, 0], projection[1, 1] = focal * height / width, focal
-    projection[2, 2] = -(FAR + NEAR) / (FAR - NEAR)
-    projection[2, 3] = -2 * FAR * NEAR / (FAR - NEAR)
-    projection[3, 2] = -1
-    return projection
 
 
 def draw_look(count: int, rng: np.random.Generator) -> Look:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +14,7 @@ from brrp_cli.errors import SceneError
 from brrp_cli.files import atomic_folder
 from brrp_cli.frames.published import depth_from_buffer, intrinsics_from_projection
 from brrp_cli.seeds import child_rng
+from tabletop.camera import FAR, NEAR, Camera, Standpoint, draw_camera
 from tabletop.check import (
     CLEAN,
     STRUCTURED_LIGHT,
@@ -23,7 +24,7 @@ from tabletop.check import (
 )
 from tabletop.light import draw_light, relight
 from tabletop.models import Model, load_model
-from tabletop.render import FAR, NEAR, NOTHING, Camera, Picture, draw_camera, draw_look, render
+from tabletop.render import NOTHING, Picture, draw_look, render
 from tabletop.settle import Pose, drop
 from tabletop.stack import stack
 from tabletop.stage import Stage, stage_of
@@ -40,7 +41,7 @@ JPEG_QUALITY = 95
 class Plan:
     """What all scenes of a set share. `noise`: a key of `LIMITS`; `light`: one of `LIGHTS`;
     `size`: (width, height); `sensor`: one of `SENSOR_NAMES`, instead of noise; `stacked`: every
-    second object is dropped onto the one before it."""
+    second object is dropped onto the one before it; `standpoint`: where cameras stand."""
 
     meshes: tuple[Path, ...]
     data_root: Path
@@ -53,6 +54,7 @@ class Plan:
     light: str = "plain"
     sensor: str = "none"
     stacked: bool = False
+    standpoint: Standpoint = field(default_factory=Standpoint)
 
 
 def check_depth(folder: Path, data_root: Path, noise: str, sensor: str) -> list[Distance]:
@@ -74,7 +76,8 @@ def make_scene(plan: Plan, number: int, check: bool) -> list[Distance]:
     rng = child_rng(plan.seed, "scene", number, "views")
     look = draw_look(len(models), rng)
     centers = [pose.apply(model.center[None])[0] for pose, model in zip(poses, models, strict=True)]
-    cameras = [draw_camera(np.mean(centers, axis=0), plan.size, rng) for _ in range(plan.views)]
+    center = np.mean(centers, axis=0)
+    cameras = [draw_camera(center, plan.size, rng, plan.standpoint) for _ in range(plan.views)]
     pictures = render(models, poses, look, cameras, plan.size)
     if plan.light == "varied":
         light_rng = child_rng(plan.seed, "scene", number, "light")

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from brrp_cli.dependencies import import_open3d
 from brrp_cli.depth_noise.view import View
 from brrp_cli.raycast import raycasting_scene
+from tabletop.camera import Camera
 from tabletop.models import Model
-from tabletop.render import Camera
 from tabletop.settle import TABLE_HALF, TABLE_THICKNESS, Pose
 
 # From OpenGL's camera (x right, y up, looking along -z) to ours (y down, looking along z).
