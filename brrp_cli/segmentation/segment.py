@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from brrp_cli.config.segmentation import SegmentConfig
 from brrp_cli.errors import FrameError
 from brrp_cli.frames.frame import BACKGROUND, Frame
+from brrp_cli.segmentation.beneath import hides_its_foot
 from brrp_cli.segmentation.components import absorb_small
 from brrp_cli.segmentation.fill_concavities import fill_inside
 from brrp_cli.segmentation.join_insides import join_insides
@@ -89,7 +90,12 @@ def _without(
     height = table.plane.signed_distance(points)
     over, masked = np.zeros(frame.shape, dtype=bool), (segmap > 0) & frame.valid
     over[masked] = table.holds(table.plan(points[masked]), 0.0)
-    reasons = left_out(segmap, points[..., 2], height, over, config.left_out)
+    reasons = {
+        i: reason
+        for i, reason in left_out(segmap, points[..., 2], height, over, config.left_out).items()
+        if reason != IN_THE_AIR
+        or not hides_its_foot(segmap == i, frame, table.plane, over, config.left_out)
+    }
     if reasons:
         log.info("Masks left out: %s (--all keeps them)", told(reasons))
     whole = [i for i, reason in reasons.items() if reason in (IN_THE_AIR, EDGE)]
