@@ -252,7 +252,8 @@ class SegmentConfig:
     and table.
 
     min_height, max_height : what rises less above the table is the table. Between the two it is
-        `sigmas` deviations of the table's own height, which grow with the square of the distance
+        `sigmas` deviations of the table's own height, which grow with the square of the distance;
+        beyond `far` metres, max_height grows so, too
     rim : pixels that rise that part of it join an object within `reach`
     margin : how far beside the seen table an object may stand
     min_area : objects that show less of themselves are dropped, metres squared; sure_part : that
@@ -262,6 +263,7 @@ class SegmentConfig:
 
     min_height: float = 0.004
     max_height: float = 0.015
+    far: float = 1.2
     sigmas: float = 3.5
     rim: float = share(0.7)
     reach: float = 0.008

@@ -42,9 +42,10 @@ def _lift(
     height: NDArray[np.float64], depth: NDArray[np.float64], config: SegmentConfig
 ) -> NDArray[np.float64]:
     """(H, W) metres above which something has risen from the table at its depth (H, W)."""
-    flat = np.abs(height) < config.max_height
+    depth = np.nan_to_num(depth, nan=float(np.nanmedian(depth)))
+    most = config.max_height * np.maximum(depth / config.far, 1.0) ** 2
+    flat = np.abs(height) < most
     scaled = height[flat] / depth[flat] ** 2
     # The median of deviations, times what makes it the deviation of a normal distribution.
     deviation = 1.4826 * float(np.median(np.abs(scaled - np.median(scaled)))) if flat.any() else 0.0
-    depth = np.nan_to_num(depth, nan=float(np.nanmedian(depth)))
-    return np.clip(config.sigmas * deviation * depth**2, config.min_height, config.max_height)
+    return np.clip(config.sigmas * deviation * depth**2, config.min_height, most)
