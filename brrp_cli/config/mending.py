@@ -58,7 +58,8 @@ class RegroupConfig:
     grown : masks made of what an object explains that are tried in a round at most; closing :
         pixels, half the width of gaps in them that are closed; least_share : of such a mask, that
         it takes from another one at least
-    reach, gap : pixels and metres in depth within which masks are neighbours
+    reach, gap : pixels and metres in depth within which masks are neighbours; apart, alike : pixels
+        and L*a*b* within which masks of the same colours may be pieces of one thing
     least_pixels : with depth, of a mask that is tried; least_cut : of one that is cut
     colours : numbers of groups of pixels that are alike in colour and place; places : what a pixel
         of distance counts against a unit of L*a*b*, of each of these groupings; lightness : of a
@@ -82,6 +83,8 @@ class RegroupConfig:
     least_share: float = share(0.02)
     reach: int = between(3, 1, 64)
     gap: float = 0.1
+    apart: int = between(40, 0, 1000)
+    alike: float = 15.0
     least_pixels: int = 300
     least_cut: int = 1000
     colours: tuple[int, ...] = (2, 4)

@@ -41,15 +41,21 @@ def other_masks(
     seed: int = 0,
     whole: Collection[int] = (),
 ) -> list[OtherMask]:
-    """Masks of what was left out, `aside` (H, W); unions of the masks `ids` with their neighbours,
-    all of them and two by two; and parts of each, by its inner boundary and by colour.
+    """Masks of what was left out, `aside` (H, W); unions of these and of the masks `ids` with their
+    neighbours, all of them and two by two, and with those near them in the same colours; and parts
+    of each of `ids`, by its inner boundary and by colour.
     `config.regroup.most` of them at most.
 
     whole : ids of masks that are not cut
     """
     own = config.regroup
-    found = [] if aside is None else _left_out(frame, aside)
-    found += [OtherMask(np.isin(frame.segmap, list(of)), of) for of in unions(frame, ids, own)]
+    both, left_out = frame, list[int]()
+    if aside is not None:
+        both, left_out = _with_left_out(frame, aside)
+    groups = [frozenset([i]) for i in left_out] + unions(both, [*ids, *left_out], own)
+    found = [
+        OtherMask(np.isin(both.segmap, list(group)), group.difference(left_out)) for group in groups
+    ]
     large = [i for i in ids if i not in whole and _size(frame, frame.segmap == i) >= own.least_cut]
     if large:
         edges = boundary_of(frame, seed, config)
@@ -64,14 +70,36 @@ def other_masks(
 
 def unions(frame: Frame, ids: Sequence[int], config: RegroupConfig) -> list[frozenset[int]]:
     """Of the masks `ids`, those that hang together, and of more than two of them each two that are
-    neighbours."""
-    pairs = _neighbours(frame, ids, config)
+    neighbours; and those that hang together over wider gaps and have the same colours, as pieces of
+    a thin ring do."""
+    pairs = _near(frame, ids, config.reach, config.gap)
+    found = [*_hanging_together(ids, pairs), *pairs]
+    if frame.coloured and config.apart > config.reach:
+        colours = _colours(frame, ids)
+        found += _hanging_together(
+            ids,
+            [
+                pair
+                for pair in _near(frame, ids, config.apart, config.gap)
+                if np.linalg.norm(np.diff([colours[i] for i in pair], axis=0)) < config.alike
+            ],
+        )
+    return list(dict.fromkeys(found))
+
+
+def _hanging_together(ids: Sequence[int], pairs: Sequence[frozenset[int]]) -> list[frozenset[int]]:
+    """Groups of two or more that pairs connect."""
     groups = {i: frozenset([i]) for i in ids}
     for pair in pairs:
         whole = frozenset[int]().union(*(groups[i] for i in pair))
         groups.update(dict.fromkeys(whole, whole))
-    every = [group for group in dict.fromkeys(groups.values()) if len(group) > 1]
-    return every + [pair for pair in pairs if pair not in every]
+    return [group for group in dict.fromkeys(groups.values()) if len(group) > 1]
+
+
+def _colours(frame: Frame, ids: Sequence[int]) -> dict[int, NDArray[np.float64]]:
+    """The median colour of each of the masks, L*a*b*."""
+    rgb2lab = import_library("skimage.color").rgb2lab
+    return {i: np.median(rgb2lab(frame.rgb[frame.segmap == i]), axis=0) for i in ids}
 
 
 def painted(
@@ -88,29 +116,31 @@ def painted(
     return found, named
 
 
-def _left_out(frame: Frame, aside: NDArray[np.integer]) -> list[OtherMask]:
-    free = frame.segmap == BACKGROUND
-    return [
-        OtherMask((aside == i) & free, frozenset()) for i in np.unique(aside[aside != BACKGROUND])
-    ]
+def _with_left_out(frame: Frame, aside: NDArray[np.integer]) -> tuple[Frame, list[int]]:
+    """The frame with what was left out as masks where it has none, and their ids."""
+    last = int(frame.segmap.max())
+    here = (aside != BACKGROUND) & (frame.segmap == BACKGROUND)
+    both = np.where(here, aside.astype(np.int64) + last, frame.segmap)
+    return frame.with_masks(both), [int(i) for i in np.unique(both[here])]
 
 
-def _neighbours(frame: Frame, ids: Sequence[int], config: RegroupConfig) -> list[frozenset[int]]:
-    """Each two of the masks that come near each other in the image, and there in depth."""
+def _near(frame: Frame, ids: Sequence[int], reach: int, gap: float) -> list[frozenset[int]]:
+    """Each two of the masks that come within `reach` pixels of each other in the image, and there
+    within `gap` metres in depth."""
     ndimage = import_library("scipy.ndimage")
     solid = np.where(np.isin(frame.segmap, list(ids)) & frame.valid, frame.segmap, BACKGROUND)
     depth = frame.points[..., 2]
     pairs = []
-    for i, rows, columns in _boxes(solid, ids, config.reach):
+    for i, rows, columns in _boxes(solid, ids, reach):
         window = (rows, columns)
         others, here = solid[window], solid[window] == i
         far, nearest = ndimage.distance_transform_edt(~here, return_indices=True)
-        beside = (others > i) & (far <= config.reach)
+        beside = (others > i) & (far <= reach)
         apart = np.abs(depth[window][tuple(nearest)] - depth[window])
         pairs += [
             frozenset((i, int(j)))
             for j in np.unique(others[beside])
-            if np.median(apart[beside & (others == j)]) < config.gap
+            if np.median(apart[beside & (others == j)]) < gap
         ]
     return pairs
 

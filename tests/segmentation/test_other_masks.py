@@ -47,6 +47,17 @@ def test_neighbours_are_near_in_depth(apart, near):
     assert bool(unions(frame, [1, 2], CONFIG)) == near
 
 
+def test_pieces_of_one_colour_hang_together_over_wider_gaps():
+    frame = row_of_masks((20, 20))
+    rgb = np.full((*frame.shape, 3), 128, np.uint8)
+    rgb[frame.segmap > 0] = (40, 40, 160)
+    rgb[frame.segmap == 3] = (160, 40, 40)
+    assert unions(replace(frame, rgb=rgb), [1, 2, 3], CONFIG) == [{1, 2}]
+    assert unions(frame, [1, 2, 3], CONFIG) == []  # no colours
+    near = replace(CONFIG, apart=19)
+    assert unions(replace(frame, rgb=rgb), [1, 2, 3], near) == []
+
+
 def test_two_things_in_one_mask_are_its_halves():
     first, second = (
         in_camera(solids.box(0.08, 0.08, high), placed(x, 0.0, 0.3))
@@ -70,6 +81,14 @@ def test_what_was_left_out_is_tried_where_nothing_else_is():
     assert not found.of and (found.mask == ((aside == 5) & (frame.segmap == 0))).all()
     few = SegmentConfig(regroup=replace(CONFIG, least_pixels=int(found.mask.sum()) + 1))
     assert other_masks(frame, [], aside, few) == []
+
+
+def test_what_was_left_out_is_tried_with_its_neighbours():
+    whole = row_of_masks()
+    frame, aside = replace(whole, segmap=whole.segmap % 3), np.where(whole.segmap == 3, 1, 0)
+    found = other_masks(frame, [2], aside, SegmentConfig())
+    assert [each.of for each in found] == [frozenset(), {2}]
+    assert (found[1].mask == (whole.segmap >= 2)).all()
 
 
 def test_there_are_no_more_tries_than_allowed():

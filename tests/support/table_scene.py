@@ -120,9 +120,15 @@ def completed_grid(
     return within(network_grid(nodes, empty, part, config), empty, bounds, config)
 
 
-def photograph(things: Mapping[int, trimesh.Trimesh], *, table: bool = True) -> Frame:
+def photograph(
+    things: Mapping[int, trimesh.Trimesh],
+    *,
+    table: bool = True,
+    T_world_cam: np.ndarray = T_WORLD_CAM,
+) -> Frame:
     """A frame of meshes by id, camera frame, on the table or in the air; depth without noise."""
-    slab = in_camera(solids.moved(solids.box(1.4, 1.4, 0.02), z=-0.02), T_CAM_WORLD)
+    slab = solids.moved(solids.box(1.4, 1.4, 0.02), z=-0.02)
+    slab = in_camera(slab, np.linalg.inv(T_world_cam))
     sight = look([*things.values(), *([slab] if table else [])], K, SHAPE)
     ids = np.array([*things, 0, 0])
     return Frame(
@@ -130,7 +136,7 @@ def photograph(things: Mapping[int, trimesh.Trimesh], *, table: bool = True) -> 
         points=backproject(sight.depth, K),
         segmap=ids[np.where(sight.index < 0, len(things), sight.index)].astype(np.int64),
         K=K,
-        T_world_cam=T_WORLD_CAM,
+        T_world_cam=T_world_cam,
     )
 
 
