@@ -222,8 +222,8 @@ class LeftOutConfig:
     foot : percentile of its outline's heights up to which the outline is its foot; reach : pixels
         from the foot that are looked at; touch : metres in depth of what touches it; held : part of
         them that are nearer, or another object that touches it, in which case it may stand
-    beneath : what lies over the table with `partly_over` of itself may hide its foot, and stand,
-        if no larger part than this of what lies straight below it is seen to be bare
+    hides : part of what lies straight below it that a mask hides itself, from which on it may stand
+        if `partly_over` of it lies over the table
     edge : metres; what is no higher than `edge_height` metres, and has nothing or what is so far
         behind it in `edge_share` of the pixels around it, is depth smeared over the table's edge
     """
@@ -239,7 +239,7 @@ class LeftOutConfig:
     reach: int = between(6, 1, 64)
     touch: float = 0.02
     held: float = share(0.25)
-    beneath: float = share(0.1)
+    hides: float = share(0.8)
     partly_over: float = share(0.3)
     edge: float = 0.1
     edge_share: float = share(0.4)

@@ -26,24 +26,21 @@ def hides_its_foot(
     seen = mask & frame.valid
     if not seen.any() or over[seen].mean() < config.partly_over:
         return False
-    return bare_beneath(mask, frame, plane, config) <= config.beneath
+    return hidden_by_itself(mask, frame, plane, config) >= config.hides
 
 
-def bare_beneath(
+def hidden_by_itself(
     mask: NDArray[np.bool_], frame: Frame, plane: Plane, config: LeftOutConfig
 ) -> float:
-    """The part of what lies straight below a mask (H, W), on the plane, that the camera sees to be
-    bare: what is measured there lies on the plane or behind it, beyond the mask's own pixels.
+    """The part of what lies straight below a mask (H, W), on the plane, that its own pixels hide
+    from the camera. 0 where the image shows nothing of it.
 
-    Something upright hides its foot, or its own pixels reach down to it. 1 of a mask below which
-    nothing is known.
+    From above that is nearly all, whether it stands or hangs. From the side it is what reaches down
+    to the table; of the upper part of something, other pixels hide it.
     """
     ndimage = import_library("scipy.ndimage")
     points = frame.points[mask & frame.valid].astype(np.float64)
     feet = points - plane.signed_distance(points)[:, None] * plane.normal
     pixel, inside = pixel_numbers(feet, frame)
-    measured = frame.depth.ravel()[pixel]
     own = ndimage.binary_dilation(mask, iterations=config.reach).ravel()[pixel]
-    known = inside & (own | (frame.valid.ravel()[pixel] & (measured > 0)))
-    bare = known & ~own & (measured > feet[:, 2] - config.touch)
-    return float(bare.sum() / known.sum()) if known.any() else 1.0
+    return float(own[inside].mean()) if inside.any() else 0.0

@@ -10,7 +10,7 @@ from brrp_cli.config.segmentation import LeftOutConfig
 from brrp_cli.demo.layout import camera_pose
 from brrp_cli.frames.build import make_frame
 from brrp_cli.observation.support_plane import Plane
-from brrp_cli.segmentation.beneath import bare_beneath, hides_its_foot
+from brrp_cli.segmentation.beneath import hidden_by_itself, hides_its_foot
 from brrp_cli.segmentation.segment import segment
 from brrp_cli.shapes import solids
 
@@ -28,32 +28,33 @@ def seen(T_world_cam, lifted=0.0):
 
 
 @pytest.mark.parametrize("pose", [FROM_ABOVE, T_WORLD_CAM], ids=["above", "side"])
-def test_below_what_stands_no_table_is_seen(pose):
+def test_what_stands_hides_its_own_foot(pose):
     frame, plane = seen(pose)
     mask = frame.segmap == 1
-    assert bare_beneath(mask, frame, plane, CONFIG) < 0.01
+    assert hidden_by_itself(mask, frame, plane, CONFIG) > 0.99
     assert hides_its_foot(mask, frame, plane, np.ones_like(mask), CONFIG)
 
 
-def test_below_what_hangs_the_table_is_seen():
-    frame, plane = seen(T_WORLD_CAM, lifted=0.2)
+@pytest.mark.parametrize(("pose", "hidden"), [(FROM_ABOVE, True), (T_WORLD_CAM, False)])
+def test_what_hangs_hides_what_is_below_it_from_above_alone(pose, hidden):
+    frame, plane = seen(pose, lifted=0.2)
     mask = frame.segmap == 1
-    assert bare_beneath(mask, frame, plane, CONFIG) > 0.9
-    assert not hides_its_foot(mask, frame, plane, np.ones_like(mask), CONFIG)
+    assert hides_its_foot(mask, frame, plane, np.ones_like(mask), CONFIG) == hidden
+    assert hidden or hidden_by_itself(mask, frame, plane, CONFIG) < 0.1
+
+
+def test_the_upper_part_of_a_thing_hides_no_foot():
+    frame, plane = seen(T_WORLD_CAM)
+    mask = frame.segmap == 1
+    upper = mask & (plane.signed_distance(frame.points) > 0.08)
+    assert upper.sum() > 300
+    assert not hides_its_foot(upper, frame, plane, np.ones_like(mask), CONFIG)
 
 
 def test_what_is_not_over_the_table_has_no_foot_there():
     frame, plane = seen(FROM_ABOVE)
     mask = frame.segmap == 1
     assert not hides_its_foot(mask, frame, plane, np.zeros_like(mask), CONFIG)
-
-
-def test_where_nothing_is_known_below_nothing_speaks_for_a_foot():
-    frame, plane = seen(T_WORLD_CAM, lifted=0.2)
-    mask = frame.segmap == 1
-    depth = np.where(mask, frame.depth, 0.0)
-    alone = make_frame(depth=depth, K=K)
-    assert bare_beneath(mask, alone, plane, CONFIG) == 1.0
 
 
 def test_a_tall_box_that_is_seen_from_above_is_found():
