@@ -82,7 +82,11 @@ def main() -> None:
         start, frames = time.perf_counter(), 0
         for scene in find_scenes(folder):
             for view in range(min(arguments.views, len(scene.views))):
-                frame = scene.view(view)
+                try:
+                    frame = scene.view(view)
+                except BrrpError as error:  # no depth at all, as too near to the camera
+                    print(f"{scene.name}: {error}", file=sys.stderr)
+                    continue
                 try:
                     found = segment(frame, keep_all=arguments.all)
                 except BrrpError as error:

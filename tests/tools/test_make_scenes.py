@@ -341,3 +341,20 @@ def test_the_option_makes_stacked_scenes(data):
     assert generate(data, data / "on", "--scenes", 1, "--views", 1, "--stack").exit_code == 0
     entries = json.loads((data / "on" / "00000000" / "objects.json").read_text())
     assert max(entry["position"][2] for entry in entries) > 0
+
+
+def test_the_options_say_where_cameras_stand(data, made):
+    result = generate(data, data / "above", "--scenes", 1, "--elevation", 80, 85, "--roll", 30, 30)
+    assert result.exit_code == 0, result.output
+    (scene,) = find_scenes(data / "above")
+    T_world_cam = scene.view(0).T_world_cam
+    assert 80 <= np.rad2deg(np.arcsin(-T_world_cam[2, 2])) <= 85
+    # Of what points down, the image's axes see the cosine and the sine of the roll.
+    slant = np.arctan2(T_world_cam[2, 0], T_world_cam[2, 1])
+    assert abs(np.rad2deg(slant)) == pytest.approx(150, abs=1e-3)
+    assert (data / "above" / "00000000" / "objects.json").read_bytes() == (
+        made / "00000000" / "objects.json"
+    ).read_bytes()
+    refused = generate(data, data / "none", "--distance", 0.05, 0.5)
+    assert refused.exit_code != 0 and "--distance" in refused.output
+    assert not (data / "none").exists()
