@@ -75,15 +75,14 @@ def unions(frame: Frame, ids: Sequence[int], config: RegroupConfig) -> list[froz
     pairs = _near(frame, ids, config.reach, config.gap)
     found = [*_hanging_together(ids, pairs), *pairs]
     if frame.coloured and config.apart > config.reach:
-        colours = _colours(frame, ids)
-        found += _hanging_together(
-            ids,
-            [
-                pair
-                for pair in _near(frame, ids, config.apart, config.gap)
-                if np.linalg.norm(np.diff([colours[i] for i in pair], axis=0)) < config.alike
-            ],
-        )
+        near = _near(frame, ids, config.apart, config.gap)
+        colours = _colours(frame, frozenset[int]().union(*near))
+        alike = [
+            pair
+            for pair in near
+            if np.linalg.norm(np.diff([colours[i] for i in pair], axis=0)) < config.alike
+        ]
+        found += _hanging_together(ids, alike)
     return list(dict.fromkeys(found))
 
 
@@ -96,7 +95,7 @@ def _hanging_together(ids: Sequence[int], pairs: Sequence[frozenset[int]]) -> li
     return [group for group in dict.fromkeys(groups.values()) if len(group) > 1]
 
 
-def _colours(frame: Frame, ids: Sequence[int]) -> dict[int, NDArray[np.float64]]:
+def _colours(frame: Frame, ids: Collection[int]) -> dict[int, NDArray[np.float64]]:
     """The median colour of each of the masks, L*a*b*."""
     rgb2lab = import_library("skimage.color").rgb2lab
     return {i: np.median(rgb2lab(frame.rgb[frame.segmap == i]), axis=0) for i in ids}

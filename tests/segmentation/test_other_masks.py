@@ -54,6 +54,8 @@ def test_pieces_of_one_colour_hang_together_over_wider_gaps():
     rgb[frame.segmap == 3] = (160, 40, 40)
     assert unions(replace(frame, rgb=rgb), [1, 2, 3], CONFIG) == [{1, 2}]
     assert unions(frame, [1, 2, 3], CONFIG) == []  # no colours
+    gone = 9  # an object whose mask was taken over
+    assert unions(replace(frame, rgb=rgb), [1, 2, 3, gone], CONFIG) == [{1, 2}]
     near = replace(CONFIG, apart=19)
     assert unions(replace(frame, rgb=rgb), [1, 2, 3], near) == []
 
