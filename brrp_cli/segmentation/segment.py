@@ -90,6 +90,7 @@ def _without(
     height = table.plane.signed_distance(points)
     over, masked = np.zeros(frame.shape, dtype=bool), (segmap > 0) & frame.valid
     over[masked] = table.holds(table.plan(points[masked]), 0.0)
+    # What hides its own foot, as from above, is not seen to hang.
     reasons = {
         i: reason
         for i, reason in left_out(segmap, points[..., 2], height, over, config.left_out).items()
