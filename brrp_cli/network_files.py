@@ -7,7 +7,8 @@ The metadata has `format`, `network` (JSON of its config, a dataclass) and `trai
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -17,7 +18,7 @@ from brrp_cli.errors import WeightsError
 from brrp_cli.files import write_bytes
 
 if TYPE_CHECKING:
-    from torch import nn
+    from torch import Tensor, nn
 
     N = TypeVar("N", bound=nn.Module)
 
@@ -46,16 +47,39 @@ def load_network(path: Path, kind: str, what: str, build: Callable[[dict[str, An
     messages. Errors: WeightsError if the file is missing, damaged or of another kind."""
     import torch
 
-    try:
-        with import_library("safetensors").safe_open(path, framework="pt") as file:
-            metadata = file.metadata() or {}
-            tensors = {name: file.get_tensor(name).to(torch.float32) for name in file.keys()}  # noqa: SIM118
-        if metadata.get("format") != kind:
-            raise ValueError(f"its format is {metadata.get('format')}")
+    with _told(path, kind, what):
+        metadata, tensors = _read(path, [kind])
         # Without numbers of its own: none are drawn from torch's random state.
         with torch.device("meta"):
             network = build(json.loads(metadata["network"]))
         network.load_state_dict(tensors, assign=True)
+    return network.eval().requires_grad_(False)
+
+
+def load_weights(path: Path, kinds: Sequence[str], what: str) -> dict[str, Tensor]:
+    """The weights of a file of one of several kinds, by name, without their network; else as
+    `load_network`."""
+    with _told(path, " or ".join(kinds), what):
+        return _read(path, kinds)[1]
+
+
+def _read(path: Path, kinds: Sequence[str]) -> tuple[dict[str, str], dict[str, Tensor]]:
+    """Metadata and weights."""
+    import torch
+
+    with import_library("safetensors").safe_open(path, framework="pt") as file:
+        metadata = file.metadata() or {}
+        tensors = {name: file.get_tensor(name).to(torch.float32) for name in file.keys()}  # noqa: SIM118
+    if metadata.get("format") not in kinds:
+        raise ValueError(f"its format is {metadata.get('format')}")
+    return metadata, tensors
+
+
+@contextmanager
+def _told(path: Path, kind: str, what: str) -> Iterator[None]:
+    """What goes wrong in reading becomes a WeightsError."""
+    try:
+        yield
     except Exception as error:  # safetensors' own exception, RuntimeError of torch, OSError
         raise WeightsError(
             f"The weights of {what} cannot be read",
@@ -64,4 +88,3 @@ def load_network(path: Path, kind: str, what: str, build: Callable[[dict[str, An
             found=error,
             fix="install brrp-cli again",
         ) from error
-    return network.eval().requires_grad_(False)

@@ -133,7 +133,7 @@ def main(
             seed=seed,
             precision=precision,
         )
-        network = started(AffinityNetworkConfig(), seed) if begin is None else resumed(begin)
+        network = started(AffinityNetworkConfig(), seed) if begin is None else resumed(begin, seed)
         training = Training(network, config, output, len(train))
         finished = run_watched(training, train, held, late)
     except BrrpError as error:

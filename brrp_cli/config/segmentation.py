@@ -96,12 +96,14 @@ class AffinitiesConfig:
     alike : mean affinity of the pixels of two parts from which on they are one object: training
         counts pairs of two objects four times, so that less than a half is even
     components : the parts that are joined, in pixels of the network's image
+    margin : pixels of that image beside what rises that the network sees, too
     """
 
     colour: float = share(0.5)
     least: float = share(0.1)
     alike: float = share(0.3)
-    components: ComponentsConfig = field(default_factory=lambda: ComponentsConfig(least_core=8))
+    components: ComponentsConfig = field(default_factory=lambda: ComponentsConfig(least_core=32))
+    margin: int = 64
 
 
 @dataclass(frozen=True)
@@ -140,7 +142,7 @@ class ConcavitiesConfig:
     sectors: int = 12
     around: int = 8
     wall: float = 0.008
-    object: float = share(0.5)
+    object: float = share(0.7)
 
 
 @dataclass(frozen=True)

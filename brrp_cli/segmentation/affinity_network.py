@@ -11,54 +11,66 @@ from dataclasses import dataclass
 
 import torch
 from torch import Tensor, nn
-from torch.nn.functional import interpolate, pad
+from torch.nn.functional import avg_pool2d, interpolate, pad
 
 from brrp_cli.segmentation.image_channels import CHANNELS
 
 # Rows and columns from a pixel to its partner, in pixels of the smaller image.
-REACHES = (2, 6, 16)
+REACHES = (2, 6, 14, 32)
 DIRECTIONS = ((0, 1), (1, 0), (1, 1), (1, -1))
 OFFSETS = tuple((reach * down, reach * right) for reach in REACHES for down, right in DIRECTIONS)
 # A pixel of the coarsest level, in those of the image, which is padded to a multiple of it.
-_MULTIPLE = 16
+_MULTIPLE = 32
 
 
 @dataclass(frozen=True)
 class AffinityNetworkConfig:
-    """widths : channels at full size, and at a half, a quarter, an eighth and a sixteenth of it"""
+    """widths : channels at full size, and at a half, a quarter, ... a 32nd of it"""
 
-    widths: tuple[int, int, int, int, int] = (16, 32, 48, 72, 96)
+    widths: tuple[int, int, int, int, int, int] = (12, 16, 32, 48, 72, 96)
 
 
 class AffinityNetwork(nn.Module):
     """Logits (B, len(OFFSETS) + 1, h, w) from channels (B, CHANNELS, h, w): affinities, and at last
-    that the pixel shows an object."""
+    that the pixel shows an object.
+
+    Most of it works at half size and below, which sees the image itself, made smaller, besides what
+    the full size says of it.
+    """
 
     def __init__(self, config: AffinityNetworkConfig) -> None:
         super().__init__()
         self.config = config
-        full, *others = config.widths
-        self.fine = nn.Sequential(nn.Conv2d(CHANNELS, full, 3, padding=1), Block(full))
+        full, *widths = config.widths
+        half, *others = widths
+        self.first = nn.Sequential(nn.Conv2d(CHANNELS, full, 3, padding=1), Block(full))
+        self.first_down = nn.Conv2d(full, half, 2, stride=2, bias=False)
+        self.fine = nn.Sequential(nn.Conv2d(CHANNELS, half, 3, padding=1), Block(half))
         self.down = nn.ModuleList(
             nn.Sequential(nn.Conv2d(wide, narrow, 2, stride=2), Block(narrow), Block(narrow))
-            for wide, narrow in zip(config.widths, others, strict=False)
+            for wide, narrow in zip(widths, others, strict=False)
         )
         self.join = nn.ModuleList(
-            Join(narrow, wide) for wide, narrow in zip(config.widths, others, strict=False)
+            Join(narrow, wide) for wide, narrow in zip(widths, others, strict=False)
         )
-        self.up = nn.ModuleList(Block(wide) for wide in config.widths[:-1])
+        self.up = nn.ModuleList(Block(wide) for wide in widths[:-1])
+        self.last_join = Join(half, full)
+        self.last_up = Block(full)
         self.out = nn.Conv2d(full, len(OFFSETS) + 1, 3, padding=1)
 
     def forward(self, values: Tensor) -> Tensor:
         """The logits of images."""
         height, width = values.shape[2:]
-        levels = [self.fine(pad(values, (0, -width % _MULTIPLE, 0, -height % _MULTIPLE)))]
+        values = pad(values, (0, -width % _MULTIPLE, 0, -height % _MULTIPLE))
+        full = self.first(values)
+        begin, block = self.fine
+        levels = [block(begin(avg_pool2d(values, 2)) + self.first_down(full))]
         for down in self.down:
             levels.append(down(levels[-1]))
         found = levels.pop()
         for join, up in zip(reversed(self.join), reversed(self.up), strict=True):
             found = up(join(found, levels.pop()))
-        logits: Tensor = self.out(found)
+        logits: Tensor = self.out(self.last_up(self.last_join(found, full)))
         return logits[..., :height, :width]
 
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from brrp_cli.segmentation.components import relabel
 from brrp_cli.segmentation.learned_affinities import Affinities
-from brrp_cli.segmentation.pixel_pairs import windows
+from brrp_cli.segmentation.pixel_pairs import box_of, windows
 
 
 def borders_of(affinities: Affinities) -> NDArray[np.float64]:
@@ -37,12 +37,14 @@ def join_alike_pixels(
     highest mean affinity, as long as it is over `least`."""
     count = int(parts.max()) + 1
     total, pairs = np.zeros((2, count * count))
+    window = box_of(parts > 0)
+    inside = parts[window]
     for same, offset in zip(affinities.same, affinities.offsets, strict=True):
-        pixel, partner = windows(offset, parts.shape)
-        first, second = parts[pixel], parts[partner]
+        pixel, partner = windows(offset, inside.shape)
+        first, second = inside[pixel], inside[partner]
         asked = (first > 0) & (second > 0) & (first != second)
         codes = first[asked] * count + second[asked]
-        total += np.bincount(codes, same[pixel][asked], count * count)
+        total += np.bincount(codes, same[window][pixel][asked], count * count)
         pairs += np.bincount(codes, minlength=count * count)
     sums, numbers = total.reshape(count, count), pairs.reshape(count, count)
     return relabel(parts, _linked(sums + sums.T, numbers + numbers.T, least))

@@ -31,7 +31,7 @@ def boundary_of(frame: Frame, seed: int, config: SegmentConfig) -> NDArray[np.fl
     except FrameError:
         log.info("No table is seen: masks are cut at jumps of depth and hollow creases alone")
         return _without_a_table(frame, config)
-    affinities = affinities_in(frame, seen, config.affinities)
+    affinities = affinities_in(frame, seen, config)
     return np.maximum(affinities.enlarge(borders_of(affinities)), seen.jumps)
 
 

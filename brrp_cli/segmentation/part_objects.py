@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from brrp_cli.config.segmentation import AffinitiesConfig
+from brrp_cli.config.segmentation import SegmentConfig
 from brrp_cli.frames.frame import Frame
 from brrp_cli.segmentation.agglomerate import borders_of, join_alike_pixels
 from brrp_cli.segmentation.components import find_parts
@@ -29,15 +29,16 @@ def part_objects(
     frame: Frame,
     seen: SeenSurfaces,
     risen: NDArray[np.bool_],
-    config: AffinitiesConfig,
+    config: SegmentConfig,
 ) -> Parted:
     """Objects in what has `risen` (H, W) from the table, without what the network takes for depth
     that bled."""
+    own = config.affinities
     affinities = affinities_in(frame, seen, config)
-    mask = affinities.sample(risen) & (affinities.object > config.least)
+    mask = affinities.sample(risen) & (affinities.object > own.least)
     border = borders_of(affinities)
-    parts = find_parts(mask, border, config.components)
-    labels = affinities.enlarge(join_alike_pixels(parts, affinities, config.alike))
+    parts = find_parts(mask, border, own.components)
+    labels = affinities.enlarge(join_alike_pixels(parts, affinities, own.alike))
     return Parted(
         np.where(risen, labels, 0),
         affinities.enlarge(border),

@@ -1,6 +1,9 @@
-"""Pixels of an image and their partners at an offset."""
+"""Pixels of an image, their partners at an offset, and the box around some of them."""
 
 from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
 
 
 def windows(
@@ -8,7 +11,23 @@ def windows(
 ) -> tuple[tuple[slice, slice], tuple[slice, slice]]:
     """The pixels of an image (h, w) that have a partner `offset` from them, and those partners."""
     (rows, other_rows), (columns, other_columns) = (
-        (slice(max(-step, 0), size - max(step, 0)), slice(max(step, 0), size + min(step, 0)))
+        (
+            slice(min(max(-step, 0), size), max(size - max(step, 0), 0)),
+            slice(min(max(step, 0), size), max(size + min(step, 0), 0)),
+        )
         for step, size in zip(offset, shape, strict=True)
     )
     return (rows, columns), (other_rows, other_columns)
+
+
+def box_of(mask: NDArray[np.bool_], margin: int = 0) -> tuple[slice, slice]:
+    """Rows and columns that hold all pixels of a mask (h, w), and so many more on all sides; none
+    of an empty one."""
+    rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
+    if not len(rows):
+        return np.s_[:0], np.s_[:0]
+    (top, left), (low, right) = (
+        np.maximum(np.array([rows[0], columns[0]]) - margin, 0),
+        np.array([rows[-1], columns[-1]]) + margin + 1,
+    )
+    return np.s_[top:low], np.s_[left:right]

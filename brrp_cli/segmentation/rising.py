@@ -8,6 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brrp_cli.config.segmentation import SegmentConfig
+from brrp_cli.frames.frame import Frame
+from brrp_cli.frames.last_frame import kept_for_last_image
 from brrp_cli.segmentation.seen_surfaces import SeenSurfaces
 
 Mask = NDArray[np.bool_]
@@ -22,6 +24,12 @@ class Rising:
     rim: Mask
     floor: Mask
     lift: NDArray[np.float64]
+
+
+@kept_for_last_image
+def rising_in(_frame: Frame, seen: SeenSurfaces, config: SegmentConfig) -> Rising:
+    """What rises in a frame of which these surfaces were seen."""
+    return rising(seen, config)
 
 
 def rising(seen: SeenSurfaces, config: SegmentConfig) -> Rising:

@@ -23,7 +23,7 @@ from brrp_cli.segmentation.left_out import EDGE, IN_THE_AIR, left_out, told
 from brrp_cli.segmentation.part_objects import Parted, part_objects
 from brrp_cli.segmentation.refine_borders import refine_borders
 from brrp_cli.segmentation.region_growing import fill_holes, grow
-from brrp_cli.segmentation.rising import rising
+from brrp_cli.segmentation.rising import rising_in
 from brrp_cli.segmentation.seen_surfaces import see_surfaces
 from brrp_cli.segmentation.split_stacks import split_stacks
 from brrp_cli.segmentation.table_plane import Table
@@ -56,8 +56,8 @@ def segment_and_aside(
     config = config or SegmentConfig()
     seen = see_surfaces(frame, seed, config)
     points, table = seen.points, seen.table
-    rises = rising(seen, config)
-    parted = part_objects(frame, seen, rises.risen, config.affinities)
+    rises = rising_in(frame, seen, config)
+    parted = part_objects(frame, seen, rises.risen, config)
     objects = join_insides(
         parted.labels, seen.plan, seen.height, table.plan(seen.normals), config.insides
     )

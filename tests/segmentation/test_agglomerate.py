@@ -6,9 +6,9 @@ import pytest
 from brrp_cli.segmentation.affinity_network import OFFSETS
 from brrp_cli.segmentation.agglomerate import borders_of, join_alike_pixels
 from brrp_cli.segmentation.learned_affinities import Affinities
-from brrp_cli.segmentation.pixel_pairs import windows
+from brrp_cli.segmentation.pixel_pairs import box_of, windows
 
-SHAPE = (20, 60)
+SHAPE = (40, 60)
 
 
 def told(objects, sure=0.9):
@@ -17,7 +17,7 @@ def told(objects, sure=0.9):
     for each, offset in zip(same, OFFSETS, strict=True):
         pixel, partner = windows(offset, SHAPE)
         each[pixel] = np.where(objects[pixel] == objects[partner], sure, 1 - sure)
-    return Affinities(same, (objects > 0).astype(np.float32), OFFSETS, SHAPE, 1)
+    return Affinities(same, (objects > 0).astype(np.float32), OFFSETS, SHAPE)
 
 
 def stripes(*widths):
@@ -33,6 +33,20 @@ def test_partners_lie_at_their_offset(offset):
     assert (rows[partner] - rows[pixel] == offset[0]).all()
     assert (columns[partner] - columns[pixel] == offset[1]).all()
     assert rows[pixel].size == (SHAPE[0] - abs(offset[0])) * (SHAPE[1] - abs(offset[1]))
+
+
+def test_no_pixel_of_a_small_image_has_a_partner_beyond_it():
+    small = np.zeros((20, 60))
+    for offset in ((32, 0), (32, -32), (-32, 32)):
+        assert small[windows(offset, small.shape)[0]].size == 0
+        assert small[windows(offset, small.shape)[1]].size == 0
+
+
+def test_the_box_holds_the_mask_and_no_more():
+    mask = np.zeros(SHAPE, bool)
+    assert mask[box_of(mask)].size == 0
+    mask[5, 7] = mask[9, 3] = True
+    assert box_of(mask) == np.s_[5:10, 3:8]
 
 
 def test_a_border_lies_between_the_pixels_that_differ():

@@ -7,14 +7,16 @@ import numpy as np
 import pytest
 import torch
 from click.testing import CliRunner
+from safetensors.torch import save_file
 from tiny_scenes import write_meshes, write_scene
 from train_masks import main
+from training import mask_batches
 from training.mask_batches import draw_batch
 from training.mask_examples import Examples, is_held, read_examples
-from training.masks import loss_of
+from training.masks import loss_of, resumed, started
 
-from brrp_cli.errors import BrrpError
-from brrp_cli.segmentation.affinity_network import OFFSETS
+from brrp_cli.errors import BrrpError, WeightsError
+from brrp_cli.segmentation.affinity_network import OFFSETS, AffinityNetworkConfig
 from brrp_cli.segmentation.image_channels import CHANNELS, SIDEWAYS
 from brrp_cli.segmentation.learned_affinities import load_affinity_network
 from brrp_cli.segmentation.pixel_pairs import windows
@@ -109,6 +111,39 @@ def test_batches_turn_labels_with_their_images():
         signs |= set(np.sign(found[0, SIDEWAYS][seen].numpy()))
         assert float(found[0, :3].abs().max()) <= 1
     assert signs == {-1.0, 1.0}
+
+
+def test_normals_turn_with_an_image_that_is_turned(monkeypatch):
+    labels = np.zeros((1, 96, 96), np.uint8)
+    labels[:, :, 48:] = 1
+    channels = np.zeros((1, CHANNELS, 96, 96), np.int8)
+    channels[:, SIDEWAYS] = 63  # toward what is masked
+    monkeypatch.setattr(mask_batches, "TURNED", 1.0)
+    examples = Examples(channels, labels, ("one",))
+    beyond = 0
+    for seed in range(8):
+        found, asked = draw_batch(examples, np.array([0]), (64, 64), np.random.default_rng(seed))
+        normals, shown = found[0, SIDEWAYS : SIDEWAYS + 2].numpy(), asked[0].numpy() > 0
+        seen = np.abs(normals).max(axis=0) > 0
+        beyond += int((~seen).sum())
+        places = np.indices(seen.shape)[::-1]  # to the right, and down
+        apart = places[:, shown].mean(axis=1) - places[:, seen & ~shown].mean(axis=1)
+        normal = normals[:, seen].mean(axis=1)
+        assert apart @ normal > 0.97 * np.linalg.norm(apart) * np.linalg.norm(normal)
+    assert beyond > 0
+
+
+def test_a_network_begins_with_what_it_has_in_common_with_an_earlier_one(tmp_path):
+    given = started(AffinityNetworkConfig(), 1).state_dict()
+    early = {n: t.half() for n, t in given.items() if not n.startswith(("first", "last", "out"))}
+    path = tmp_path / "earlier.safetensors"
+    save_file(early, path, metadata={"format": "brrp affinities 1"})
+    begun = resumed(path, 0).state_dict()
+    assert all(torch.equal(begun[name], early[name].float()) for name in early)
+    assert not begun["first_down.weight"].any()
+    assert torch.equal(begun["out.weight"], started(AffinityNetworkConfig(), 0).out.weight)
+    with pytest.raises(WeightsError, match="network that parts objects cannot be read"):
+        resumed(tmp_path / "none.safetensors", 0)
 
 
 def test_views_of_a_scene_are_kept_together(tmp_path):

@@ -17,6 +17,8 @@ Batch = tuple[Tensor, Tensor]
 
 # Times that images are drawn larger or smaller.
 ZOOM = (0.6, 1.5)
+# How often an image is turned about the line of sight, as that of a camera at a wrist.
+TURNED = 0.35
 # How often: depth has holes, colours are greys, all one, blurred, light falls in spots, or from one
 # side.
 HOLES, GREY, BLANK, BLURRED, SPOTS, ONE_SIDE = 0.4, 0.1, 0.08, 0.3, 0.4, 0.4
@@ -25,7 +27,11 @@ HOLES, GREY, BLANK, BLURRED, SPOTS, ONE_SIDE = 0.4, 0.1, 0.08, 0.3, 0.4, 0.4
 REPAINTED, EACH, TABLE, PRINTED, INKS = 0.7, 0.4, 0.7, 0.7, 4
 MOST_HOLES = 12
 # Of brightness in each channel (log), of gamma (log), of noise, 0 to 1.
-BRIGHTNESS, TINT, GAMMA, NOISE = 0.35, 0.12, 0.3, 0.04
+BRIGHTNESS, TINT, GAMMA, NOISE = 0.35, 0.12, 0.3, 0.06
+# Pixels over which colours are blurred.
+BLURS = (3, 3, 5, 7)
+# Sides of what is cut out of the depth, and sizes of what is printed, in pixels.
+LARGEST_HOLE, PRINTS = 48, (6, 100)
 
 
 def draw_batch(
@@ -45,20 +51,50 @@ def draw_batch(
 def _window(
     examples: Examples, row: int, size: tuple[int, int], rng: np.random.Generator
 ) -> tuple[NDArray[np.int8], NDArray[np.uint8]]:
-    """A window of one example, larger or smaller, and mirrored every other time."""
+    """A window of one example, larger or smaller, mirrored every other time, and at times turned:
+    what lies beyond the image then shows nothing."""
     channels, labels = examples.channels[row], examples.labels[row]
     step = 1 / np.exp(rng.uniform(*np.log(ZOOM)))
-    places = []
-    for length, whole in zip(size, labels.shape, strict=True):
-        step_here = min(step, whole / length)
-        start = rng.uniform(0, whole - step_here * length)
-        places.append((start + step_here * np.arange(length)).astype(np.int64))
-    chosen = np.ix_(*places)
-    channels, labels = channels[:, *chosen].copy(), labels[chosen]
+    if rng.random() < TURNED:
+        channels, labels = _turned(channels, labels, size, step, rng)
+    else:
+        places = []
+        for length, whole in zip(size, labels.shape, strict=True):
+            step_here = min(step, whole / length)
+            start = rng.uniform(0, whole - step_here * length)
+            places.append((start + step_here * np.arange(length)).astype(np.int64))
+        chosen = np.ix_(*places)
+        channels, labels = channels[:, *chosen].copy(), labels[chosen]
     if rng.random() < 0.5:
         channels, labels = channels[..., ::-1].copy(), labels[..., ::-1]
         channels[SIDEWAYS] *= -1
     return channels, labels
+
+
+def _turned(
+    channels: NDArray[np.int8],
+    labels: NDArray[np.uint8],
+    size: tuple[int, int],
+    step: float,
+    rng: np.random.Generator,
+) -> tuple[NDArray[np.int8], NDArray[np.uint8]]:
+    """A window about a point in the middle half of the image, turned by any angle."""
+    angle = rng.uniform(-np.pi, np.pi)
+    cos, sin = np.cos(angle), np.sin(angle)
+    down, right = (
+        step * (np.arange(length) - length / 2)[shape]
+        for length, shape in zip(size, (np.s_[:, None], np.s_[None]), strict=True)
+    )
+    middle = [rng.uniform(0.25, 0.75) * length for length in labels.shape]
+    rows = np.floor(middle[0] + cos * down + sin * right).astype(np.int64)
+    columns = np.floor(middle[1] - sin * down + cos * right).astype(np.int64)
+    inside = (rows >= 0) & (rows < labels.shape[0]) & (columns >= 0) & (columns < labels.shape[1])
+    rows, columns = (np.where(inside, each, 0) for each in (rows, columns))
+    found = np.where(inside, channels[:, rows, columns], 0).astype(np.int8)
+    x, y = found[SIDEWAYS].astype(np.float32), found[SIDEWAYS + 1].astype(np.float32)
+    found[SIDEWAYS] = np.rint(cos * x + sin * y)
+    found[SIDEWAYS + 1] = np.rint(cos * y - sin * x)
+    return found, np.where(inside, labels[rows, columns], 0).astype(np.uint8)
 
 
 def _other_colours(
@@ -87,7 +123,8 @@ def _other_colours(
     light += rng.normal(0, NOISE * rng.random(), light.shape)
     light = np.clip(light, 0, 1).astype(np.float32)
     if rng.random() < BLURRED:
-        blurred = avg_pool2d(torch.from_numpy(light), 3, 1, 1, count_include_pad=False)
+        over = int(rng.choice(BLURS))
+        blurred = avg_pool2d(torch.from_numpy(light), over, 1, over // 2, count_include_pad=False)
         light = blurred.numpy()
     return np.asarray(2 * light - 1, np.float32)
 
@@ -128,7 +165,7 @@ def _from_one_side(normals: NDArray[np.float32], rng: np.random.Generator) -> ND
 
 def _print(shape: tuple[int, ...], rng: np.random.Generator) -> NDArray[np.int64]:
     """(h, w) numbers of inks: squares, stripes or stains, of any size, with sharp edges."""
-    size, turn = np.exp(rng.uniform(np.log(4), np.log(50))), rng.uniform(0, np.pi)
+    size, turn = np.exp(rng.uniform(*np.log(PRINTS))), rng.uniform(0, np.pi)
     rows, columns = np.indices(shape)
     across = (np.cos(turn) * columns + np.sin(turn) * rows) / size
     down = (np.cos(turn) * rows - np.sin(turn) * columns) / (size * rng.uniform(0.3, 1))
@@ -140,7 +177,7 @@ def _print(shape: tuple[int, ...], rng: np.random.Generator) -> NDArray[np.int64
     if kind == 2:  # panels of any ink
         table = rng.integers(INKS, size=(64, 64))
         return table[np.floor(across).astype(np.int64) % 64, np.floor(down).astype(np.int64) % 64]
-    stains = _smooth(shape, int(3 + 240 / size), rng) + 0.3 * _smooth(shape, 90, rng)
+    stains = _smooth(shape, int(3 + 480 / size), rng) + 0.3 * _smooth(shape, 90, rng)
     return np.digitize(stains, [-0.5, 0.0, 0.5])
 
 
@@ -157,6 +194,6 @@ def _cut_holes(channels: NDArray[np.float32], rng: np.random.Generator) -> None:
     height, width = channels.shape[1:]
     for _ in range(int(rng.integers(1, MOST_HOLES))):
         row, column = int(rng.integers(height)), int(rng.integers(width))
-        rows, columns = (int(each) for each in np.exp(rng.uniform(0, np.log(24), 2)))
+        rows, columns = (int(each) for each in np.exp(rng.uniform(0, np.log(LARGEST_HOLE), 2)))
         geometry = np.s_[COLOURS.stop : CHANNELS, row : row + rows, column : column + columns]
         channels[geometry] = 0

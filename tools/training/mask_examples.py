@@ -24,7 +24,7 @@ from brrp_cli.errors import BrrpError, FrameError
 from brrp_cli.files import write_bytes
 from brrp_cli.ground_truth.scenes import Scene
 from brrp_cli.seeds import child_rng
-from brrp_cli.segmentation.image_channels import CHANNELS, image_channels, step_of
+from brrp_cli.segmentation.image_channels import CHANNELS, image_channels, resized
 from brrp_cli.segmentation.seen_surfaces import see_surfaces
 from training.completion_examples import through_a_sensor
 
@@ -71,8 +71,7 @@ def make_view(wanted: Wanted, seed: int, folder: Path) -> Path:
         channels = image_channels(frame.rgb, see_surfaces(frame, seed, SegmentConfig()))
     except FrameError:
         channels = np.zeros((CHANNELS, 0, 0), np.int8)
-    step, size = step_of(frame.shape), channels.shape[1:]
-    labels = frame.segmap[step // 2 :: step, step // 2 :: step][: size[0], : size[1]]
+    labels = resized(frame.segmap, (channels.shape[1], channels.shape[2]))
     # 0 and then 1, 2, ...: ids may be of any size.
     ids = np.unique(labels[labels > 0])
     labels = np.where(labels > 0, np.searchsorted(ids, labels) + 1, 0).astype(np.uint8)

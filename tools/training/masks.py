@@ -12,13 +12,14 @@ from torch import Tensor
 from torch.nn.functional import binary_cross_entropy_with_logits as cross_entropy
 
 from brrp_cli.files import atomic_path
+from brrp_cli.network_files import load_weights
 from brrp_cli.seeds import child_seed
 from brrp_cli.segmentation.affinity_network import (
     OFFSETS,
     AffinityNetwork,
     AffinityNetworkConfig,
 )
-from brrp_cli.segmentation.learned_affinities import load_affinity_network
+from brrp_cli.segmentation.learned_affinities import FORMATS, WHAT
 from brrp_cli.segmentation.pixel_pairs import windows
 from training.epochs import EpochsConfig, EpochTraining
 from training.mask_batches import Batch, draw_batch
@@ -45,7 +46,7 @@ class TrainingConfig(EpochsConfig):
     batch: int = 8
     rate: float = 3e-3
     warming: int = 100
-    size: tuple[int, int] = (192, 256)
+    size: tuple[int, int] = (288, 384)
     decay: float = 0.02
     precision: str = "float32"
 
@@ -56,10 +57,18 @@ def started(config: AffinityNetworkConfig, seed: int) -> AffinityNetwork:
     return AffinityNetwork(config)
 
 
-def resumed(path: Path) -> AffinityNetwork:
-    """A network to train on, from a file that `tools/train_masks.py` wrote. Errors:
-    WeightsError."""
-    return load_affinity_network(path).requires_grad_(True)
+def resumed(path: Path, seed: int) -> AffinityNetwork:
+    """A network to train on: what it has in common with that of a file that `tools/train_masks.py`
+    wrote, of this or of an earlier kind, is as it is there. Errors: WeightsError."""
+    network = started(AffinityNetworkConfig(), seed)
+    tensors = load_weights(path, FORMATS, WHAT)
+    own = network.state_dict()
+    same = {n: t for n, t in tensors.items() if n in own and own[n].shape == t.shape}
+    network.load_state_dict(same, strict=False)
+    # What looks at the image for the first time says nothing of it to those that have learned.
+    if "first_down.weight" not in same:
+        torch.nn.init.zeros_(network.first_down.weight)
+    return network
 
 
 def pairs(labels: Tensor, offset: tuple[int, int]) -> tuple[Tensor, Tensor, tuple[slice, slice]]:
