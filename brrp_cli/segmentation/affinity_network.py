@@ -15,7 +15,7 @@ from torch.nn.functional import avg_pool2d, interpolate, pad
 
 from brrp_cli.segmentation.image_channels import CHANNELS
 
-# Rows and columns from a pixel to its partner, in pixels of the smaller image.
+# Rows and columns from a pixel to its partner, in pixels of the network's image.
 REACHES = (2, 6, 14, 32)
 DIRECTIONS = ((0, 1), (1, 0), (1, 1), (1, -1))
 OFFSETS = tuple((reach * down, reach * right) for reach in REACHES for down, right in DIRECTIONS)

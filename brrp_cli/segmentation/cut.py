@@ -32,7 +32,7 @@ def boundary_of(frame: Frame, seed: int, config: SegmentConfig) -> NDArray[np.fl
         log.info("No table is seen: masks are cut at jumps of depth and hollow creases alone")
         return _without_a_table(frame, config)
     affinities = affinities_in(frame, seen, config)
-    return np.maximum(affinities.enlarge(borders_of(affinities)), seen.jumps)
+    return np.maximum(affinities.restore(borders_of(affinities)), seen.jumps)
 
 
 def _without_a_table(frame: Frame, config: SegmentConfig) -> NDArray[np.float64]:

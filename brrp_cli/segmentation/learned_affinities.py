@@ -47,11 +47,10 @@ NAME = "affinities.safetensors"
 
 @dataclass(frozen=True)
 class Affinities:
-    """What the network says of an image (H, W) that it saw smaller, (h, w).
+    """What the network says of an image (H, W) that it saw as one of (h, w) pixels.
 
     same : (K, h, w) probability that a pixel and the one `offsets` (K, 2) from it show one object;
     object : (h, w) that it shows one
-    shape : (H, W)
     """
 
     same: NDArray[np.float32]
@@ -63,7 +62,7 @@ class Affinities:
         """(h, w) of (H, W)."""
         return resized(values, (self.object.shape[0], self.object.shape[1]))
 
-    def enlarge(self, values: NDArray[T]) -> NDArray[T]:
+    def restore(self, values: NDArray[T]) -> NDArray[T]:
         """(H, W) of (h, w)."""
         return resized(values, self.shape)
 
@@ -88,7 +87,7 @@ def affinities_of(
     """What the network says of colours (H, W, 3) and the surfaces that were seen.
 
     colour : what it says so counts so much, and the rest what it says where all colours are one
-    asked : (H, W) of the box around these pixels, and of `margin` pixels of the smaller image
+    asked : (H, W) of the box around these pixels, and of `margin` pixels of its own image
         beyond it; 0 elsewhere. None = of the whole image
     """
     import torch

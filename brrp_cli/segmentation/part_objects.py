@@ -38,9 +38,9 @@ def part_objects(
     mask = affinities.sample(risen) & (affinities.object > own.least)
     border = borders_of(affinities)
     parts = find_parts(mask, border, own.components)
-    labels = affinities.enlarge(join_alike_pixels(parts, affinities, own.alike))
+    labels = affinities.restore(join_alike_pixels(parts, affinities, own.alike))
     return Parted(
         np.where(risen, labels, 0),
-        affinities.enlarge(border),
-        affinities.enlarge(affinities.object),
+        affinities.restore(border),
+        affinities.restore(affinities.object),
     )

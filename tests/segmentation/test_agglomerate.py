@@ -47,6 +47,7 @@ def test_the_box_holds_the_mask_and_no_more():
     assert mask[box_of(mask)].size == 0
     mask[5, 7] = mask[9, 3] = True
     assert box_of(mask) == np.s_[5:10, 3:8]
+    assert mask[box_of(mask, 4)].shape == (13, 12)  # not beyond the left edge
 
 
 def test_a_border_lies_between_the_pixels_that_differ():

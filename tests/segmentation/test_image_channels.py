@@ -30,7 +30,7 @@ def channels_of(frame):
 
 
 def at_its_size(channels, frame):
-    """The channels, or one of them, at the frame's own size."""
+    """The channels at the frame's own size."""
     return np.moveaxis(resized(np.moveaxis(channels, 0, -1), frame.shape), -1, 0)
 
 
@@ -72,7 +72,7 @@ def test_stripes_as_fine_as_pixels_become_grey_in_a_large_image(scene):
 
     K = scene.K.copy()
     K[:2] *= 8
-    rgb = np.zeros((*scene.rgb.shape[:2], 3), np.uint8).repeat(8, axis=0).repeat(8, axis=1)
+    rgb = large(np.zeros_like(scene.rgb))
     rgb[:, ::2] = 255
     frame = make_frame(rgb=rgb, depth=large(scene.depth), K=K)
     assert frame.shape == (960, 1280) and size_of(frame.shape) == (480, 640)

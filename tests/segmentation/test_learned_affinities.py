@@ -33,7 +33,7 @@ def test_a_file_gives_the_network_back(tmp_path, scene):
     before = affinities_of(frame.rgb, seen, network)
     after = affinities_of(frame.rgb, seen, load_affinity_network(path))
     np.testing.assert_allclose(before.same, after.same, atol=0.01)
-    assert before.enlarge(before.object).shape == frame.shape
+    assert before.restore(before.object).shape == frame.shape
     assert ((before.same > 0) & (before.same < 1)).all()
 
 
@@ -49,13 +49,26 @@ def test_a_file_that_cannot_be_used_is_named(tmp_path, bad):
     assert str(path) in str(raised.value)
 
 
-def test_the_smaller_image_and_that_of_the_camera_lie_on_each_other():
+def test_the_networks_image_and_that_of_the_camera_lie_on_each_other():
     nothing = np.zeros((3, 5), np.float32)
     affinities = Affinities(nothing[None], nothing, ((0, 2),), (7, 11))
     few = np.arange(15).reshape(3, 5)
-    large = affinities.enlarge(few)
+    large = affinities.restore(few)
     assert large.shape == (7, 11) and (large[3:4, 5:6] == 7).all()
     assert np.array_equal(affinities.sample(large), few)
+
+
+def test_the_network_sees_the_box_that_is_asked_for_and_nothing_else(scene):
+    seen = see_surfaces(make_frame(depth=scene.depth, K=scene.K), 0, SegmentConfig())
+    asked = np.zeros(scene.depth.shape, bool)
+    none = affinities_of(scene.rgb, seen, tiny(), asked=asked, margin=4)
+    assert not none.object.any() and not none.same.any()
+    asked[40:60, 50:90] = True  # the network's image is twice as large
+    found = affinities_of(scene.rgb, seen, tiny(), asked=asked, margin=4)
+    box = np.zeros(found.object.shape, bool)
+    box[76:124, 96:184] = True
+    assert np.array_equal(found.object > 0, box)
+    assert (found.same[:, box] > 0).all() and not found.same[:, ~box].any()
 
 
 @pytest.mark.parametrize("colour", [0.0, 1.0])

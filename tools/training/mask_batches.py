@@ -55,20 +55,29 @@ def _window(
     what lies beyond the image then shows nothing."""
     channels, labels = examples.channels[row], examples.labels[row]
     step = 1 / np.exp(rng.uniform(*np.log(ZOOM)))
-    if rng.random() < TURNED:
-        channels, labels = _turned(channels, labels, size, step, rng)
-    else:
-        places = []
-        for length, whole in zip(size, labels.shape, strict=True):
-            step_here = min(step, whole / length)
-            start = rng.uniform(0, whole - step_here * length)
-            places.append((start + step_here * np.arange(length)).astype(np.int64))
-        chosen = np.ix_(*places)
-        channels, labels = channels[:, *chosen].copy(), labels[chosen]
+    cut = _turned if rng.random() < TURNED else _upright
+    channels, labels = cut(channels, labels, size, step, rng)
     if rng.random() < 0.5:
         channels, labels = channels[..., ::-1].copy(), labels[..., ::-1]
         channels[SIDEWAYS] *= -1
     return channels, labels
+
+
+def _upright(
+    channels: NDArray[np.int8],
+    labels: NDArray[np.uint8],
+    size: tuple[int, int],
+    step: float,
+    rng: np.random.Generator,
+) -> tuple[NDArray[np.int8], NDArray[np.uint8]]:
+    """A window anywhere within the image."""
+    places = []
+    for length, whole in zip(size, labels.shape, strict=True):
+        step_here = min(step, whole / length)
+        start = rng.uniform(0, whole - step_here * length)
+        places.append((start + step_here * np.arange(length)).astype(np.int64))
+    chosen = np.ix_(*places)
+    return channels[:, *chosen].copy(), labels[chosen]
 
 
 def _turned(
