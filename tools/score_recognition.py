@@ -17,7 +17,9 @@ missing  no mask holds 30 % of it
 
 `wrong` counts masks that were taken for a stored object, weight over 0.5, that most of the mask is
 not; `pixels` of such masks are in the rows. `mm` is the mean distance of placed models, where
-they are recognised, from the true surface.
+they are recognised, from the true surface. The last line holds the weights of all masks that were
+taken for a stored object against how many of them are right: the expected calibration error (ECE),
+and the masks and those that are right between the weights of WEIGHTS.
 """
 
 from __future__ import annotations
@@ -27,6 +29,7 @@ import json
 import sys
 import time
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -41,6 +44,7 @@ from brrp_cli.config.segmentation import SegmentConfig
 from brrp_cli.dependencies import import_open3d
 from brrp_cli.errors import BrrpError
 from brrp_cli.evaluation.bootstrap import mean_interval
+from brrp_cli.evaluation.calibration import expected_calibration_error
 from brrp_cli.frames.frame import Frame
 from brrp_cli.geometry import transform_points
 from brrp_cli.ground_truth.scenes import Scene, find_scenes, true_mesh_in_camera
@@ -51,6 +55,8 @@ from brrp_cli.segmentation.left_out import border_share
 from brrp_cli.segmentation.segment import segment
 from brrp_cli.session import Reconstructor
 
+# Edges of the bins in which weights are held against what is right.
+WEIGHTS = (0.5, 0.8, 0.95, 1.0)
 CAUSES = ("own", "shared", "pieces", "table", "part", "rough", "missing")
 
 Row = dict[str, Any]
@@ -100,7 +106,7 @@ def _holds_mostly(truth: np.ndarray, mask: np.ndarray, object_id: int) -> bool:
 def rows_of(
     scene: Scene, again: Reconstructor, prior: Prior, data_root: Path, given: bool, least: int
 ) -> list[Row]:
-    """A row for each object that the prior holds, and one for each mask taken for another."""
+    """A row for each object that the prior holds, and one for each mask taken for one."""
     frame = scene.view(0)
     start = time.perf_counter()
     masks = frame.segmap if given else segment(frame)
@@ -145,17 +151,16 @@ def rows_of(
             continue
         true_id = told[item.object_id]
         true_name = scene.object(true_id).name if true_id else "nothing"
-        if taken.name != true_name:
-            rows.append(
-                {
-                    "scene": scene.name,
-                    "wrong": taken.name,
-                    "weight": taken.weight,
-                    "is": true_name,
-                    "stored": true_name in prior.names,
-                    "pixels": int((result.frame.segmap == item.object_id).sum()),
-                }
-            )
+        rows.append(
+            {
+                "scene": scene.name,
+                "taken": taken.name,
+                "weight": taken.weight,
+                "is": true_name,
+                "stored": true_name in prior.names,
+                "pixels": int((result.frame.segmap == item.object_id).sum()),
+            }
+        )
     rows.append({"scene": scene.name, "masks": len(result.objects)})
     return rows
 
@@ -189,7 +194,8 @@ def share_of(objects: list[Row]) -> str:
 def report(name: str, rows: list[Row]) -> str:
     """Lines of one set: all, and by cause."""
     objects = [row for row in rows if "object" in row]
-    wrong = [row for row in rows if "wrong" in row]
+    taken = [row for row in rows if "taken" in row]
+    wrong = [row for row in taken if row["taken"] != row["is"]]
     masks = sum(row["masks"] for row in rows if "masks" in row)
     found = [row for row in objects if row["recognised"]]
     near = 1000 * np.mean([row["distance"] for row in found]) if found else np.nan
@@ -203,7 +209,23 @@ def report(name: str, rows: list[Row]) -> str:
             lines.append(
                 f"  {why:8} {len(those):4}, recognised {sum(r['recognised'] for r in those):4}"
             )
+    if taken:
+        lines.append(f"  {weights_told(taken)}")
     return "\n".join(lines)
+
+
+def weights_told(taken: list[Row]) -> str:
+    """How often weights are right, of masks that were taken for a stored object."""
+    weight = np.array([row["weight"] for row in taken], np.float64)
+    right = np.array([row["taken"] == row["is"] for row in taken])
+    bins = [
+        f"{low:g} to {high:g}: {right[these].sum()} of {these.sum()}"
+        for low, high in pairwise(WEIGHTS)
+        # A weight on an edge belongs to the bin above it, and 1 to the last.
+        if (these := (weight >= low) & ((weight < high) | (high == 1))).any()
+    ]
+    error = expected_calibration_error(weight, right)
+    return f"weights  ECE {error:.3f}; right, {', '.join(bins)}"
 
 
 def main() -> None:

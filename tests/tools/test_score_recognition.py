@@ -1,10 +1,10 @@
-"""What became of an object's mask, on masks that were made to be wrong in one way."""
+"""What became of masks that are wrong in one way, and how often weights are right."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
-from score_recognition import cause
+from score_recognition import cause, report, weights_told
 
 TRUTH = np.repeat([0, 1, 2], [100, 100, 100])
 
@@ -28,3 +28,21 @@ def masks(*lengths):
 )
 def test_the_cause_is_told(found, why, shared):
     assert cause(TRUTH, found, 1) == (why, shared)
+
+
+def taken(weight, right):
+    """A mask that was taken for a can with that weight."""
+    return {"scene": "0", "taken": "can", "weight": weight, "is": "can" if right else "box"}
+
+
+def test_weights_are_held_against_what_is_right():
+    rows = [taken(0.6, True), taken(0.6, False), taken(0.8, False), taken(1.0, True)]
+    # |0.5 - 0.6| of two masks, |0 - 0.8| of one and none of the last.
+    assert weights_told(rows) == (
+        "weights  ECE 0.250; right, 0.5 to 0.8: 1 of 2, 0.8 to 0.95: 0 of 1, 0.95 to 1: 1 of 1"
+    )
+
+
+def test_masks_that_are_something_else_count_as_wrong():
+    told = report("set", [taken(0.9, True), taken(0.7, False), {"scene": "0", "masks": 3}])
+    assert "1 of 3 masks wrong" in told
