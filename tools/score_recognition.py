@@ -218,11 +218,11 @@ def weights_told(taken: list[Row]) -> str:
     """How often weights are right, of masks that were taken for a stored object."""
     weight = np.array([row["weight"] for row in taken], np.float64)
     right = np.array([row["taken"] == row["is"] for row in taken])
+    counts, rights = (np.histogram(those, WEIGHTS)[0] for those in (weight, weight[right]))
     bins = [
-        f"{low:g} to {high:g}: {right[these].sum()} of {these.sum()}"
-        for low, high in pairwise(WEIGHTS)
-        # A weight on an edge belongs to the bin above it, and 1 to the last.
-        if (these := (weight >= low) & ((weight < high) | (high == 1))).any()
+        f"{low:g} to {high:g}: {true} of {count}"
+        for (low, high), true, count in zip(pairwise(WEIGHTS), rights, counts, strict=True)
+        if count
     ]
     error = expected_calibration_error(weight, right)
     return f"weights  ECE {error:.3f}; right, {', '.join(bins)}"
