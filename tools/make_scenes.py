@@ -20,6 +20,8 @@ bleeding silhouettes, steps and holes (docs/sensors.md); it takes the place of `
 what stands where stays as it is.
 `--stack` drops every second object onto the one before it, which stands with its open side up
 where it has one: can on can, jar in bowl. It draws other scenes than a set without it.
+`--bin` lets them lie in a bin of any size, which is background, as the table is. It draws other
+scenes than a set without it.
 `--distance`, `--elevation` and `--roll` say where cameras stand: `--elevation 70 89` looks down,
 `--distance 0.3 0.5` is a camera at a wrist, which `--roll -180 180` turns about its line of sight.
 
@@ -86,6 +88,7 @@ def _size(_context: click.Context, _option: click.Parameter, value: str) -> tupl
 @click.option("--sensor", default="none", show_default=True, type=click.Choice(SENSOR_NAMES))
 @click.option("--light", default="plain", show_default=True, type=click.Choice(list(LIGHTS)))
 @click.option("--stack", "stacked", is_flag=True, help="Set objects on and into one another.")
+@click.option("--bin", "binned", is_flag=True, help="Drop objects into a bin.")
 @click.option("--size", default="640x480", show_default=True, callback=_size)
 @click.option(
     "--distance",
@@ -128,6 +131,7 @@ def main(
     sensor: str,
     light: str,
     stacked: bool,
+    binned: bool,
     size: tuple[int, int],
     distance: tuple[float, float],
     elevation: tuple[float, float],
@@ -143,6 +147,8 @@ def main(
             raise click.UsageError(
                 "--noise and --sensor exclude each other: a sensor brings its own"
             )
+        if stacked and binned:
+            raise click.UsageError("--stack and --bin exclude each other")
         if data_root is None:
             if meshes is None:
                 raise click.UsageError("name the meshes: --meshes, or --data-root with --check")
@@ -172,6 +178,7 @@ def main(
             light,
             sensor,
             stacked,
+            binned,
             Standpoint(distance, elevation, roll),
         )
         _report(list(_make_all(plan, scenes, workers)), output)

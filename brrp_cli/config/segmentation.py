@@ -56,6 +56,43 @@ class TableConfig:
 
 
 @dataclass(frozen=True)
+class BinsConfig:
+    """Bins, totes and trays: walls of one height around a floor. Lengths are metres.
+
+    points : about so many are looked at, at least
+    cell : of the plan's grid; step : of the heights of rims that are tried, from `least_height` to
+    `most_height` above the table; band : what is that far above or below may be of the same rim;
+    uneven : how far a rim may be above or below its own median
+    gap : cells; twice as many may be missing in a rim; least_rim : metres squared of it
+    complete : part of the outline, as far as the image shows it, that is rim; shown : part of the
+    outline that the image shows; hollow : part of what it encloses that is lower
+    area : that it encloses, metres squared: more than large bowls and pans do; seen : metres
+    squared of the floor that are seen; low : what rises less may be floor
+    beside : how far beside the seen table a bin may reach; bled : how far depth bleeds beside its
+    walls; over : what rises so far over the rim is an object
+    """
+
+    points: int = 100_000
+    cell: float = 0.01
+    step: float = 0.01
+    least_height: float = 0.04
+    most_height: float = 0.5
+    band: float = 0.02
+    uneven: float = 0.01
+    gap: int = between(2, 1, 16)
+    least_rim: float = 0.003
+    complete: float = share(0.75)
+    shown: float = share(0.5)
+    hollow: float = share(0.5)
+    area: float = 0.08
+    seen: float = 0.005
+    low: float = 0.03
+    beside: float = 0.1
+    bled: float = 0.01
+    over: float = 0.015
+
+
+@dataclass(frozen=True)
 class ConcaveEdgesConfig:
     """Jumps of depth and hollow creases.
 
@@ -275,6 +312,7 @@ class SegmentConfig:
     sure: float = share(0.7)
     smooth_depth: SmoothDepthConfig = field(default_factory=SmoothDepthConfig)
     table: TableConfig = field(default_factory=TableConfig)
+    bins: BinsConfig = field(default_factory=BinsConfig)
     concave_edges: ConcaveEdgesConfig = field(default_factory=ConcaveEdgesConfig)
     components: ComponentsConfig = field(default_factory=ComponentsConfig)
     affinities: AffinitiesConfig = field(default_factory=AffinitiesConfig)

@@ -36,7 +36,9 @@ def rising(seen: SeenSurfaces, config: SegmentConfig) -> Rising:
     """What rises in a frame."""
     lift = _lift(seen.height, seen.depth, config)
     on_table = np.zeros(seen.valid.shape, dtype=bool)
-    on_table[seen.valid] = seen.table.holds(seen.plan[seen.valid], config.margin)
+    plan, height = seen.plan[seen.valid], seen.height[seen.valid]
+    on_table[seen.valid] = seen.table.holds(plan, config.margin)
+    on_table[seen.valid] &= ~seen.table.walls(plan, height, config.bins)
     with np.errstate(invalid="ignore"):
         return Rising(
             on_table & (seen.height > lift),

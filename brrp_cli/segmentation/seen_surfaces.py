@@ -27,7 +27,7 @@ class SeenSurfaces:
     """What a frame shows, after depth was smoothed and flying pixels were left out.
 
     depth : (H, W) metres, NaN = none; points : (H, W, 3) metres, camera frame; valid : (H, W)
-    height : (H, W) metres above the table; plan : (H, W, 2) metres, on it
+    height : (H, W) metres above the table or a floor of a bin; plan : (H, W, 2) metres, on it
     normals : (H, W, 3) unit, toward the camera; angles : (H, W) degrees of hollow creases; jumps :
     (H, W) pixels beside which depth jumps
     """
@@ -58,14 +58,14 @@ def see_surfaces(frame: Frame, seed: int, config: SegmentConfig) -> SeenSurfaces
             f" {int(valid.sum())} of them agree with their neighbours",
             fix="check the depth image and its unit; masks made elsewhere go in by --masks",
         )
-    table = find_table(points[valid], seed, frame.source, config.table)
+    table = find_table(points[valid], seed, frame.source, config.table, config.bins)
     normals = surface_normals(points, config.concave_edges)
     return SeenSurfaces(
         depth,
         points,
         valid,
         table,
-        table.plane.signed_distance(points),
+        table.height(points),
         table.plan(points),
         normals,
         hollow_angles(points, normals, config.concave_edges),

@@ -65,7 +65,7 @@ def segment_and_aside(
     segmap = absorb_small(objects, parted.border, ~_are_large(objects, frame, parted, config))
     # Pixels at edges, which were left out of the smoothed depth, join what they lie next to.
     edges = frame.valid & ~seen.valid
-    edges &= table.plane.signed_distance(frame.points) > config.rim * rises.lift
+    edges &= _may_rise(frame, table, rises.lift, config)
     points = np.where(edges[..., None], frame.points, points)
     segmap = grow(segmap, points, rises.rim | edges, config.reach)
     # Specks would grow with their borders.
@@ -81,13 +81,23 @@ def segment_and_aside(
     return _numbered(segmap, frame, config), aside
 
 
+def _may_rise(
+    frame: Frame, table: Table, lift: NDArray[np.float64], config: SegmentConfig
+) -> NDArray[np.bool_]:
+    """(H, W) the pixels whose own depth rises nearly as far as an object's must, `lift` (H, W)."""
+    height = table.height(frame.points)
+    may = height > config.rim * lift
+    may[may] = ~table.walls(table.plan(frame.points[may]), height[may], config.bins)
+    return may
+
+
 def _without(
     segmap: NDArray[np.int64], frame: Frame, table: Table, config: SegmentConfig
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """The masks without those that are left out, which the log tells, and of the latter those that
     may be whole objects."""
     points = np.where(frame.valid[..., None], frame.points, np.nan)
-    height = table.plane.signed_distance(points)
+    height = table.height(points)
     over, masked = np.zeros(frame.shape, dtype=bool), (segmap > 0) & frame.valid
     over[masked] = table.holds(table.plan(points[masked]), 0.0)
     # What hides its own foot, as from above, is not seen to hang.

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from brrp_cli.config.segmentation import TableConfig
+from brrp_cli.config.segmentation import BinsConfig, TableConfig
 from brrp_cli.dependencies import import_library
 from brrp_cli.errors import FrameError
 from brrp_cli.observation.support_plane import Plane, largest_plane
 from brrp_cli.seeds import child_rng, child_seed
+from brrp_cli.segmentation.bins import Bin, find_bins
+from brrp_cli.segmentation.hulls import convex_hull, in_hull
 
 
 @dataclass(frozen=True)
@@ -21,11 +23,13 @@ class Table:
     plane : the objects' side, which is the camera's, is positive
     axes : (2, 3) float64, unit, spanning the plane: plan coordinates are points @ axes.T
     hull : (m, 3) float64: plan points p with hull[:, :2] @ p + hull[:, 2] <= 0 lie on the table
+    bins : on the table; they count as part of it
     """
 
     plane: Plane
     axes: NDArray[np.float64]
     hull: NDArray[np.float64]
+    bins: tuple[Bin, ...] = ()
 
     def plan(self, points: NDArray[np.floating]) -> NDArray[np.float64]:
         """Plan coordinates (..., 2), metres, of points (..., 3), camera frame."""
@@ -35,30 +39,35 @@ class Table:
         """(n,) whether plan points (n, 2) lie on the table or at most `margin` beside it."""
         return in_hull(self.hull, plan, margin)
 
+    def height(self, points: NDArray[np.floating]) -> NDArray[np.float64]:
+        """(...,) metres above the table, or above the floor of a bin, of points (..., 3)."""
+        height = self.plane.signed_distance(points)
+        flat, plan = height.reshape(-1), self.plan(points).reshape(-1, 2)
+        for each in self.bins:
+            flat[in_hull(each.outside, plan, 0.0)] -= each.floor
+        return height
 
-def in_hull(
-    hull: NDArray[np.float64], plan: NDArray[np.floating], margin: float
-) -> NDArray[np.bool_]:
-    """(n,) whether plan points (n, 2) lie in a hull (m, 3) grown by `margin`."""
-    # Edge by edge: a table of all points and edges would not fit the cache.
-    x, y = np.ascontiguousarray(plan[:, 0]), np.ascontiguousarray(plan[:, 1])
-    inside = np.ones(len(plan), dtype=bool)
-    for a, b, c in hull:
-        inside &= a * x + b * y <= margin - c
-    return inside
+    def walls(
+        self, plan: NDArray[np.floating], height: NDArray[np.floating], config: BinsConfig
+    ) -> NDArray[np.bool_]:
+        """(n,) which of plan points (n, 2) at `height` (n,) are a bin's walls, not what it holds.
 
-
-def convex_hull(plan: NDArray[np.float64]) -> NDArray[np.float64] | None:
-    """Half planes (m, 3) of the convex hull of plan points (n, 2); None if it has no area."""
-    spatial = import_library("scipy.spatial")
-    try:
-        return np.asarray(spatial.ConvexHull(plan).equations, dtype=np.float64)
-    except (spatial.QhullError, ValueError):
-        return None
+        What rises over the rim is no wall.
+        """
+        walls = np.zeros(len(plan), dtype=bool)
+        for each in self.bins:
+            low = height < each.rim - each.floor + config.over
+            around = in_hull(each.outside, plan, config.bled)
+            walls |= around & low & ~in_hull(each.inside, plan, 0.0)
+        return walls
 
 
 def find_table(
-    points: NDArray[np.floating], seed: int, source: object, config: TableConfig
+    points: NDArray[np.floating],
+    seed: int,
+    source: object,
+    config: TableConfig,
+    bins: BinsConfig | None = None,
 ) -> Table:
     """The support plane of points (n, 3), metres, camera frame.
 
@@ -68,6 +77,7 @@ def find_table(
 
     source : for messages. Errors: FrameError if no plane holds `config.least` of the points.
     """
+    every = points
     if len(points) > config.points:
         drawn = child_rng(seed, "table").choice(len(points), config.points, replace=False)
         points = points[drawn]
@@ -87,7 +97,12 @@ def find_table(
     hull = convex_hull(_largest_patch(on, config.cell))
     if hull is None:
         raise FrameError("The support plane has no extent", where=source)
-    return Table(plane=plane, axes=axes, hull=hull)
+    table = Table(plane=plane, axes=axes, hull=hull)
+    if bins is None:
+        return table
+    plan = table.plan(every)
+    near = table.holds(plan, bins.beside)
+    return replace(table, bins=find_bins(plan[near], plane.signed_distance(every[near]), bins))
 
 
 def _largest_planes(

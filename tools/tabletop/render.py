@@ -16,9 +16,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from tabletop.bin import Bin
 from tabletop.camera import Camera
 from tabletop.models import Model
-from tabletop.settle import TABLE_HALF, TABLE_THICKNESS, Pose
+from tabletop.settle import TABLE, Panel, Pose
 from tabletop.world import World, new_world
 
 NOTHING = 1.0  # depth buffer where there is no return: the far plane
@@ -60,8 +61,10 @@ def render(
     look: Look,
     cameras: Sequence[Camera],
     size: tuple[int, int],
+    bin: Bin | None = None,
 ) -> list[Picture]:
-    """A picture from each camera, `size` = (width, height). Object number i has the id i + 1."""
+    """A picture from each camera, `size` = (width, height). Object number i has the id i + 1;
+    table and bin are background."""
     with new_world() as world, tempfile.TemporaryDirectory() as textures:
         ids = {
             _add_object(world, model, pose, color, Path(textures) / f"{i}.bmp"): i + 1
@@ -69,12 +72,23 @@ def render(
                 zip(models, poses, look.object_colors, strict=True)
             )
         }
-        half = [TABLE_HALF, TABLE_HALF, TABLE_THICKNESS / 2]
-        table = world.createVisualShape(
-            world.GEOM_BOX, halfExtents=half, rgbaColor=[*look.table_color, 1]
-        )
-        world.createMultiBody(0, -1, table, basePosition=[0, 0, -TABLE_THICKNESS / 2])
+        _show(world, TABLE, look.table_color)
+        for panel in bin.panels() if bin else ():
+            _show(world, panel, np.array(bin.color))
         return [_take(world, camera, look, ids, size) for camera in cameras]
+
+
+def _show(world: World, panel: Panel, color: NDArray[np.float64]) -> None:
+    shape = world.createVisualShape(
+        world.GEOM_BOX, halfExtents=panel.half.tolist(), rgbaColor=[*color, 1]
+    )
+    world.createMultiBody(
+        0,
+        -1,
+        shape,
+        basePosition=panel.position.tolist(),
+        baseOrientation=panel.orientation.tolist(),
+    )
 
 
 def _add_object(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +15,7 @@ from brrp_cli.errors import SceneError
 from brrp_cli.files import atomic_folder
 from brrp_cli.frames.published import depth_from_buffer, intrinsics_from_projection
 from brrp_cli.seeds import child_rng
+from tabletop.bin import Bin, draw_bin
 from tabletop.camera import FAR, NEAR, Camera, Standpoint, draw_camera
 from tabletop.check import (
     CLEAN,
@@ -41,7 +43,8 @@ JPEG_QUALITY = 95
 class Plan:
     """What all scenes of a set share. `noise`: a key of `LIMITS`; `light`: one of `LIGHTS`;
     `size`: (width, height); `sensor`: one of `SENSOR_NAMES`, instead of noise; `stacked`: every
-    second object is dropped onto the one before it; `standpoint`: where cameras stand."""
+    second object is dropped onto the one before it; `binned`: objects lie in a bin; `standpoint`:
+    where cameras stand."""
 
     meshes: tuple[Path, ...]
     data_root: Path
@@ -54,6 +57,7 @@ class Plan:
     light: str = "plain"
     sensor: str = "none"
     stacked: bool = False
+    binned: bool = False
     standpoint: Standpoint = field(default_factory=Standpoint)
 
 
@@ -72,13 +76,17 @@ def make_scene(plan: Plan, number: int, check: bool) -> list[Distance]:
 
     Errors: SceneError if the check fails or no draw leaves enough objects on the table.
     """
-    paths, models, poses = draw_objects(plan.meshes, plan.seed, number, stacked=plan.stacked)
+    # Numbers of its own, so that other scenes stay as they are.
+    bin = draw_bin(child_rng(plan.seed, "scene", number, "bin")) if plan.binned else None
+    paths, models, poses = draw_objects(
+        plan.meshes, plan.seed, number, stacked=plan.stacked, bin=bin
+    )
     rng = child_rng(plan.seed, "scene", number, "views")
     look = draw_look(len(models), rng)
     centers = [pose.apply(model.center[None])[0] for pose, model in zip(poses, models, strict=True)]
     center = np.mean(centers, axis=0)
     cameras = [draw_camera(center, plan.size, rng, plan.standpoint) for _ in range(plan.views)]
-    pictures = render(models, poses, look, cameras, plan.size)
+    pictures = render(models, poses, look, cameras, plan.size, bin)
     if plan.light == "varied":
         light_rng = child_rng(plan.seed, "scene", number, "light")
         light = draw_light(light_rng)
@@ -106,7 +114,7 @@ def make_scene(plan: Plan, number: int, check: bool) -> list[Distance]:
                 # The same materials in every view.
                 material_rng = child_rng(plan.seed, "scene", number, "materials")
                 stage = stage_of(
-                    models, poses, look.object_colors, camera, K, depth.shape, material_rng
+                    models, poses, look.object_colors, camera, K, depth.shape, material_rng, bin
                 )
                 depth = measured_buffer(
                     plan.sensor, stage, child_rng(plan.seed, "scene", number, "sensor", i)
@@ -116,13 +124,20 @@ def make_scene(plan: Plan, number: int, check: bool) -> list[Distance]:
 
 
 def draw_objects(
-    meshes: tuple[Path, ...], seed: int, number: int, *, stacked: bool = False
+    meshes: tuple[Path, ...],
+    seed: int,
+    number: int,
+    *,
+    stacked: bool = False,
+    bin: Bin | None = None,
 ) -> tuple[list[Path], list[Model], list[Pose]]:
     """Three to ten objects that lie still on the table; drawn again until there are three.
 
     A mesh comes twice only where there are fewer meshes than objects.
     """
     place = stack if stacked else drop
+    if bin is not None:
+        place = partial(drop, panels=bin.panels(), radius=bin.radius)
     for attempt in range(MAX_DRAWS):
         rng = child_rng(seed, "scene", number, "objects", attempt)
         count = int(rng.integers(FEWEST, MOST + 1))

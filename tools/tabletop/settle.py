@@ -9,6 +9,7 @@ and collide as they are.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -40,6 +41,23 @@ class Pose:
         return points @ rotation(self.orientation).T + self.position
 
 
+@dataclass(frozen=True)
+class Panel:
+    """A box that stays where it is: middle (3,), orientation xyzw (4,), half its size (3,), metres,
+    world."""
+
+    position: NDArray[np.float64]
+    orientation: NDArray[np.float64]
+    half: NDArray[np.float64]
+
+
+TABLE = Panel(
+    np.array([0.0, 0.0, -TABLE_THICKNESS / 2]),
+    np.array([0.0, 0.0, 0.0, 1.0]),
+    np.array([TABLE_HALF, TABLE_HALF, TABLE_THICKNESS / 2]),
+)
+
+
 def rotation(xyzw: NDArray[np.float64]) -> NDArray[np.float64]:
     """(3, 3) matrix of a quaternion."""
     from scipy.spatial.transform import Rotation
@@ -47,17 +65,26 @@ def rotation(xyzw: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.asarray(Rotation.from_quat(xyzw).as_matrix(), dtype=np.float64)
 
 
-def drop(models: list[Model], rng: np.random.Generator) -> list[Pose | None]:
+def drop(
+    models: list[Model],
+    rng: np.random.Generator,
+    panels: Sequence[Panel] = (),
+    radius: float | None = None,
+) -> list[Pose | None]:
     """Where each model comes to rest; None for one that fell off the table.
 
     Drawn from `rng`: place and orientation of each drop. All are None if the heap does not come to
     rest or was pressed into the table.
+
+    panels : what stands on the table and stays there
+    radius : metres; no drop is further from the middle (default: `drop_radius`)
     """
     with new_world() as world:
         world.setGravity(0, 0, -9.81)
-        add_table(world)
+        for panel in (TABLE, *panels):
+            add_panel(world, panel)
         bodies: list[int] = []
-        radius = drop_radius(models)
+        radius = drop_radius(models) if radius is None else min(radius, drop_radius(models))
         for model in models:
             bodies.append(_drop_one(world, model, bodies, radius, rng))
             step(world, PAUSE)
@@ -83,12 +110,16 @@ def drop_radius(models: list[Model]) -> float:
     return float(np.clip(0.5 * np.sqrt(np.sum(diameters**2)), 0.05, 0.4 * TABLE_HALF))
 
 
-def add_table(world: World) -> None:
-    """The table that everything is dropped on."""
-    half = [TABLE_HALF, TABLE_HALF, TABLE_THICKNESS / 2]
-    shape = world.createCollisionShape(world.GEOM_BOX, halfExtents=half)
-    table = world.createMultiBody(0, shape, basePosition=[0, 0, -TABLE_THICKNESS / 2])
-    set_contact(world, table)
+def add_panel(world: World, panel: Panel) -> None:
+    """A box to drop things on, or against."""
+    shape = world.createCollisionShape(world.GEOM_BOX, halfExtents=panel.half.tolist())
+    body = world.createMultiBody(
+        0,
+        shape,
+        basePosition=panel.position.tolist(),
+        baseOrientation=panel.orientation.tolist(),
+    )
+    set_contact(world, body)
 
 
 def set_contact(world: World, body: int) -> None:

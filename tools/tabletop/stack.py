@@ -17,9 +17,10 @@ from brrp_cli.raycast import raycasting_scene
 from tabletop.models import Model
 from tabletop.settle import (
     DROP_HEIGHT,
+    TABLE,
     TABLE_HALF,
     Pose,
-    add_table,
+    add_panel,
     come_to_rest,
     rotation,
     set_contact,
@@ -55,7 +56,7 @@ def stack(models: list[Model], rng: np.random.Generator) -> list[Pose | None]:
     poses: list[Pose | None] = [None] * len(models)
     with new_world() as world:
         world.setGravity(0, 0, -9.81)
-        add_table(world)
+        add_panel(world, TABLE)
         spots: list[tuple[NDArray[np.float64], float]] = []
         bodies: dict[int, int] = {}
         for number, model in enumerate(lower):

@@ -13,9 +13,10 @@ from numpy.typing import NDArray
 from brrp_cli.dependencies import import_open3d
 from brrp_cli.depth_noise.view import View
 from brrp_cli.raycast import raycasting_scene
+from tabletop.bin import Bin
 from tabletop.camera import Camera
 from tabletop.models import Model
-from tabletop.settle import TABLE_HALF, TABLE_THICKNESS, Pose
+from tabletop.settle import TABLE, Panel, Pose, rotation
 
 # From OpenGL's camera (x right, y up, looking along -z) to ours (y down, looking along z).
 _FLIP = np.diag([1.0, -1.0, -1.0])
@@ -134,6 +135,7 @@ def stage_of(
     K: NDArray[np.float64],
     shape: tuple[int, int],
     rng: np.random.Generator,
+    bin: Bin | None = None,
 ) -> Stage:
     """The stage of a tabletop scene; `rng` draws what the materials do to infrared light."""
     R = _FLIP @ camera.view[:3, :3]
@@ -145,7 +147,10 @@ def stage_of(
             for model, pose, color in zip(models, poses, colors, strict=True)
         )
     ]
-    surfaces.append(_table(R, t, rng))
+    surfaces.append(_panel(TABLE, *_furniture(rng), R, t))
+    if bin is not None:
+        material = _furniture(rng)
+        surfaces += [_panel(panel, *material, R, t) for panel in bin.panels()]
     return Stage(tuple(surfaces), K, shape)
 
 
@@ -175,12 +180,20 @@ def _material(
     return base * (1 - ink * (1 - grey)), float(gloss)
 
 
-def _table(R: NDArray[np.float64], t: NDArray[np.float64], rng: np.random.Generator) -> Surface:
+def _furniture(rng: np.random.Generator) -> tuple[NDArray[np.float64], float]:
+    albedo, gloss = rng.uniform(0.3, 0.8), rng.uniform(0.0, 0.3)
+    return np.asarray(albedo), float(gloss)
+
+
+def _panel(
+    panel: Panel,
+    albedo: NDArray[np.float64],
+    gloss: float,
+    R: NDArray[np.float64],
+    t: NDArray[np.float64],
+) -> Surface:
     import trimesh
 
-    box = trimesh.creation.box((2 * TABLE_HALF, 2 * TABLE_HALF, TABLE_THICKNESS))
-    vertices = np.asarray(box.vertices) - [0, 0, TABLE_THICKNESS / 2]
-    albedo, gloss = rng.uniform(0.3, 0.8), rng.uniform(0.0, 0.3)
-    return Surface(
-        vertices @ R.T + t, np.asarray(box.faces, dtype=np.int64), None, np.asarray(albedo), gloss
-    )
+    box = trimesh.creation.box(2 * panel.half)
+    vertices = np.asarray(box.vertices) @ rotation(panel.orientation).T + panel.position
+    return Surface(vertices @ R.T + t, np.asarray(box.faces, dtype=np.int64), None, albedo, gloss)
