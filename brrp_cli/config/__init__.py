@@ -22,7 +22,7 @@ from brrp_cli.config.inference import (
     VolumeConfig,
 )
 from brrp_cli.config.kin import KinConfig
-from brrp_cli.config.observation import ObservationConfig, SensorConfig, StrayConfig
+from brrp_cli.config.observation import FloorConfig, ObservationConfig, SensorConfig, StrayConfig
 from brrp_cli.config.registration import (
     ColourConfig,
     FeatureConfig,
@@ -47,6 +47,7 @@ __all__ = [
     "FeatureConfig",
     "FittedDepthConfig",
     "FittedMapConfig",
+    "FloorConfig",
     "HypothesesConfig",
     "InferenceConfig",
     "KinConfig",
@@ -115,7 +116,10 @@ class Config:
 PRESETS = {
     "default": Config(preset="default"),
     "paper": Config(
-        preset="paper", surface=SurfaceConfig(level=0.5, one_piece=False), hypotheses=None
+        preset="paper",
+        observation=ObservationConfig(floor=None),
+        surface=SurfaceConfig(level=0.5, one_piece=False),
+        hypotheses=None,
     ),
 }
 

@@ -4,7 +4,26 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from brrp_cli.config.ranges import share
+from brrp_cli.config.ranges import between, share
+
+
+@dataclass(frozen=True)
+class FloorConfig:
+    """What lies around the objects, where that is not the largest plane: a bin's floor, a tray.
+
+    cell : metres of the plan's grid; reach : cells around the objects that are looked at; band :
+    metres above and below the largest plane; least_points : of background there
+    rounds : times the median of what is within `spread` metres of the last one is taken
+    apart : metres; nearer to the largest plane, it is the same
+    """
+
+    cell: float = 0.01
+    reach: int = between(6, 1, 100)
+    band: float = 0.03
+    least_points: int = 200
+    rounds: int = 3
+    spread: float = 0.005
+    apart: float = 0.002
 
 
 @dataclass(frozen=True)
@@ -17,6 +36,7 @@ class ObservationConfig:
     plane_radius : metres around the scene's middle in which the support plane is looked for;
         plane_tolerance : of its inliers; plane_iterations : of RANSAC, on plane_ransac_points
         drawn points at most; plane_min_points : that a plane needs
+    floor : where the plane around the objects is another one; None: it is never
     below_draws : samples below the plane within `below_radius`, metres, of the object's middle
     free_cell, surface_cell : metres, of grids in which samples of one label are thinned
     """
@@ -30,6 +50,7 @@ class ObservationConfig:
     plane_iterations: int = 1000
     plane_ransac_points: int = 4_000
     plane_min_points: int = 100
+    floor: FloorConfig | None = field(default_factory=FloorConfig)
     below_draws: int = 50_000
     below_radius: float = 0.2
     free_cell: float = 0.015

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from brrp_cli.config import ObservationConfig
-from brrp_cli.dependencies import import_open3d, seeded_open3d
+from brrp_cli.config import FloorConfig, ObservationConfig
+from brrp_cli.dependencies import import_library, import_open3d, seeded_open3d
 from brrp_cli.geometry import lengths, normalise, similarity
 from brrp_cli.seeds import child_seed
 
@@ -62,6 +62,44 @@ def fit_plane(
     if offset < 0:
         model, offset = -model, -offset
     return Plane(normal=model[:3].copy(), offset=offset)
+
+
+def floor_beneath(
+    plane: Plane,
+    background: NDArray[np.floating],
+    objects: NDArray[np.floating],
+    config: FloorConfig,
+) -> Plane:
+    """The plane moved along its normal to what lies around the objects, where that is another one.
+
+    The largest plane is the table, but things may lie in a bin, on a tray or on a board, whose
+    surface is millimetres above it, or in a hollow.
+
+    background, objects : (n, 3) and (m, 3) metres, camera frame
+    """
+    T = plane_frame(plane)
+    near = background[np.abs(plane.signed_distance(background)) < config.band]
+    if not len(near) or not len(objects):
+        return plane
+    around, on = (
+        np.floor((points @ T[:2, :3].T) / config.cell).astype(np.int64)
+        for points in (near, objects)
+    )
+    corner = on.min(axis=0) - config.reach
+    held = np.zeros(on.max(axis=0) - corner + config.reach + 1, dtype=bool)
+    held[tuple((on - corner).T)] = True
+    beside = import_library("scipy.ndimage").binary_dilation(held, iterations=config.reach)
+    index = around - corner
+    there = ((index >= 0) & (index < held.shape)).all(axis=1)
+    there[there] = beside[tuple(index[there].T)]
+    height = plane.signed_distance(near[there])
+    if len(height) < config.least_points:
+        return plane
+    middle = float(np.median(height))
+    # Walls and the lower ends of what stands there are higher, and the table about them is lower.
+    for _ in range(config.rounds):
+        middle = float(np.median(height[np.abs(height - middle) <= config.spread]))
+    return plane if abs(middle) < config.apart else Plane(plane.normal, plane.offset - middle)
 
 
 def largest_plane(
