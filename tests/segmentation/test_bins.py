@@ -1,0 +1,147 @@
+"""Bins on a table: found where they are, and what lies in them, on them and beside them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import trimesh
+from table_scene import in_camera, photograph
+
+from brrp_cli.config.segmentation import SegmentConfig
+from brrp_cli.demo.layout import camera_pose, turn
+from brrp_cli.frames.build import make_frame
+from brrp_cli.frames.frame import Frame
+from brrp_cli.geometry import similarity, transform_points
+from brrp_cli.segmentation.seen_surfaces import SeenSurfaces, see_surfaces
+from brrp_cli.segmentation.segment import segment
+from brrp_cli.shapes import solids
+
+CONFIG = SegmentConfig()
+LENGTH, WIDTH, HEIGHT, FLOOR, WALL = 0.36, 0.26, 0.1, 0.006, 0.004
+YAW = 0.3
+# From 0.8 m, 50 degrees above the table.
+T_WORLD_CAM = camera_pose(np.array([0.0, 0.0, 0.03]), 0.8, np.deg2rad(50.0), 0.9)
+BIN = 99
+
+
+def bin_mesh() -> trimesh.Trimesh:
+    outer = solids.box(LENGTH + 2 * WALL, WIDTH + 2 * WALL, HEIGHT)
+    return solids.difference(outer, solids.moved(solids.box(LENGTH, WIDTH, HEIGHT), z=FLOOR))
+
+
+def seen(
+    *things: trimesh.Trimesh,
+    bin: trimesh.Trimesh | None = None,
+    T_world_cam: np.ndarray = T_WORLD_CAM,
+    noise: float = 0.0,
+    without_depth: np.ndarray | None = None,
+) -> Frame:
+    """A bin, turned by YAW, and things 1, 2, ...; all are placed in its own frame."""
+    T_cam_bin = np.linalg.inv(T_world_cam) @ similarity(1.0, turn(YAW), np.zeros(3))
+    meshes = {number: in_camera(thing, T_cam_bin) for number, thing in enumerate(things, start=1)}
+    meshes[BIN] = in_camera(bin_mesh() if bin is None else bin, T_cam_bin)
+    clean = photograph(meshes, T_world_cam=T_world_cam)
+    depth = np.nan_to_num(clean.points[..., 2])
+    depth += np.random.default_rng(0).normal(0, 1, depth.shape) * noise * depth**2
+    if without_depth is not None:
+        depth[without_depth] = 0.0
+    segmap = np.where(clean.segmap == BIN, 0, clean.segmap)
+    return make_frame(rgb=clean.rgb, segmap=segmap, depth=depth, K=clean.K, T_world_cam=T_world_cam)
+
+
+def surfaces(frame: Frame) -> SeenSurfaces:
+    return see_surfaces(frame, 0, CONFIG)
+
+
+def standing(size: tuple[float, float, float], x: float, y: float) -> trimesh.Trimesh:
+    """A box on the bin's floor."""
+    return solids.moved(solids.box(*size), x=x, y=y, z=FLOOR)
+
+
+def overlap(first, second):
+    return (first & second).sum() / (first | second).sum()
+
+
+def found_as(found: np.ndarray, truth: np.ndarray) -> float:
+    """The best overlap of a mask with the true one."""
+    return max(overlap(found == i, truth) for i in np.unique(found[found > 0]))
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.003])
+def test_a_bin_is_found_with_its_floor_and_its_rim(noise):
+    frame = seen(standing((0.08, 0.06, 0.07), 0.05, 0.02), noise=noise)
+    table = surfaces(frame).table
+    (one,) = table.bins
+    assert one.rim == pytest.approx(HEIGHT, abs=0.006)
+    assert one.floor == pytest.approx(FLOOR, abs=0.003 if noise else 0.001)
+    T_cam_bin = np.linalg.inv(T_WORLD_CAM) @ similarity(1.0, turn(YAW), np.zeros(3))
+    x, y = LENGTH / 2, WIDTH / 2
+    for shift, inside in ((-0.025, True), (0.012, False)):
+        corners = [[s * (x + shift), t * (y + shift), 0.0] for s in (-1, 1) for t in (-1, 1)]
+        plan = table.plan(transform_points(T_cam_bin, np.array(corners)))
+        held = (plan @ one.inside[:, :2].T + one.inside[:, 2] <= 0).all(axis=1)
+        assert held.all() if inside else not held.any()
+
+
+def test_heights_in_a_bin_are_above_its_floor():
+    frame = seen(standing((0.08, 0.06, 0.07), 0.05, 0.02))
+    height = surfaces(frame).height
+    top = np.nanpercentile(height[frame.segmap == 1], 90)
+    assert top == pytest.approx(0.07, abs=0.002)
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.003])
+def test_things_in_a_bin_have_masks_and_its_walls_have_none(noise):
+    frame = seen(
+        standing((0.08, 0.06, 0.07), -0.08, 0.03), standing((0.05, 0.09, 0.05), 0.09, -0.02),
+        noise=noise,
+    )  # fmt: skip
+    found = segment(frame)
+    assert found.max() == 2
+    assert min(found_as(found, frame.segmap == i) for i in (1, 2)) > 0.7
+
+
+def test_what_stands_against_a_wall_and_over_the_rim_is_whole():
+    tall = standing((0.08, 0.06, 0.2), 0.0, WIDTH / 2 - 0.032)
+    frame = seen(tall)
+    found = segment(frame)
+    assert found.max() == 1
+    assert found_as(found, frame.segmap == 1) > 0.8
+
+
+def test_what_stands_beside_a_bin_is_found_too():
+    ball = solids.moved(solids.ball(0.04), x=0.26, y=0.0)
+    inside = standing((0.08, 0.06, 0.07), -0.05, 0.0)
+    frame = seen(ball, inside)
+    found = segment(frame)
+    assert found.max() == 2
+    assert min(found_as(found, frame.segmap == i) for i in (1, 2)) > 0.7
+
+
+def test_a_bin_of_which_a_wall_has_no_depth_is_one():
+    whole = seen(standing((0.08, 0.06, 0.07), 0.0, 0.0))
+    near = np.zeros(whole.shape, bool)
+    near[165:] = True  # the lower part of the image: the nearest wall and its corners
+    assert len(surfaces(whole).table.bins) == 1
+    assert len(surfaces(seen(standing((0.08, 0.06, 0.07), 0.0, 0.0), without_depth=near)).table.bins) == 1  # fmt: skip  # noqa: E501
+
+
+def test_a_bin_that_the_border_cuts_is_one():
+    aside = camera_pose(np.array([0.14, 0.12, 0.03]), 0.6, np.deg2rad(60.0), 0.9)
+    frame = seen(standing((0.08, 0.06, 0.07), 0.05, 0.02), T_world_cam=aside)
+    assert len(surfaces(frame).table.bins) == 1
+    found = segment(frame)
+    assert found.max() == 1 and found_as(found, frame.segmap == 1) > 0.7
+
+
+def test_bowls_and_heaps_of_boxes_are_no_bins():
+    bowl = solids.spherical_bowl(0.06, 0.13, 0.08, 0.004)
+    assert surfaces(seen(bin=bowl)).table.bins == ()
+    heights = (0.06, 0.1, 0.16, 0.08, 0.13, 0.05)
+    angles = np.linspace(0, 2 * np.pi, len(heights), endpoint=False)
+    around = [
+        solids.moved(solids.box(0.09, 0.07, high), x=0.17 * np.cos(a), y=0.17 * np.sin(a))
+        for high, a in zip(heights, angles, strict=True)
+    ]
+    frame = seen(*around[1:], bin=around[0])
+    assert surfaces(frame).table.bins == ()
