@@ -66,15 +66,22 @@ class BinsConfig:
     gap : cells; twice as many may be missing in a rim; least_rim : metres squared of it
     complete : part of the outline, as far as the image shows it, that is rim; shown : part of the
     outline that the image shows; hollow : part of what it encloses that is lower
-    area : that it encloses, metres squared: more than large bowls and pans do; seen : metres
-    squared of the floor that are seen; low : what rises less may be floor
+    area : that it encloses, metres squared: more than large bowls and pans do; rectangle : the same
+    of a rectangle; corners : part of it that the hull of the rim's cells fills; turn : radians
+    between the directions in which sides of rectangles are looked for; sides : coordinates that are
+    tried in each, `apart` metres or more from one another
+    low : what rises less may be floor; floor_seen : part of what it encloses that the hull of the
+    floor makes up, or a heap hides it and the floor is taken to reach `wall` metres from the rim;
+    least_floor : metres squared that tell how high the floor is
+    lies : what rises more over the floor lies in it; filled : metres squared of that, or the bin is
+    empty, and a thing itself
     beside : how far beside the seen table a bin may reach; bled : how far depth bleeds beside its
     walls; over : what rises so far over the rim is an object
     """
 
     points: int = 100_000
     cell: float = 0.01
-    step: float = 0.01
+    step: float = 0.02
     least_height: float = 0.04
     most_height: float = 0.5
     band: float = 0.02
@@ -85,8 +92,17 @@ class BinsConfig:
     shown: float = share(0.5)
     hollow: float = share(0.5)
     area: float = 0.08
-    seen: float = 0.005
+    rectangle: float = 0.05
+    corners: float = share(0.93)
+    turn: float = 0.035
+    sides: int = between(4, 2, 16)
+    apart: float = 0.04
     low: float = 0.03
+    floor_seen: float = share(0.6)
+    wall: float = 0.02
+    least_floor: float = 0.002
+    lies: float = 0.012
+    filled: float = 0.0004
     beside: float = 0.1
     bled: float = 0.01
     over: float = 0.015

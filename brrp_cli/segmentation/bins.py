@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +19,8 @@ from brrp_cli.dependencies import import_library
 from brrp_cli.segmentation.hulls import convex_hull, in_hull
 
 Cells = NDArray[np.bool_]
+
+AROUND = np.ones((3, 3), dtype=bool)
 
 
 @dataclass(frozen=True)
@@ -64,10 +67,19 @@ class _Plan:
         return in_hull(hull, self.middles, margin).reshape(self.tops.shape)
 
 
+@dataclass(frozen=True)
+class _Rim:
+    """hull : (m, 3) around it; height : metres; length : cells of it that are there"""
+
+    hull: NDArray[np.float64]
+    height: float
+    length: int
+
+
 def find_bins(
     plan: NDArray[np.floating], height: NDArray[np.floating], config: BinsConfig
 ) -> tuple[Bin, ...]:
-    """The bins that points on and above the table show, those with the most complete rim first.
+    """The bins that points on and above the table show, those with the longest rim first.
 
     plan : (n, 2) metres, on the table; height : (n,) metres above it
     """
@@ -79,11 +91,11 @@ def find_bins(
     cells = _cells(np.asarray(plan[known], np.float64), height[known], config.cell)
     bins: list[Bin] = []
     taken = np.zeros(cells.tops.shape, dtype=bool)
-    for _, rim, ring in sorted(_rings(cells, config), key=lambda found: -found[0]):
-        region = cells.filled(ring, config.cell / 2)
+    for rim in sorted(_rings(cells, config), key=lambda rim: -rim.length):
+        region = cells.filled(rim.hull, config.cell / 2)
         if (region & taken).any():
             continue
-        found = _bin(cells, ring, rim, config)
+        found = _bin(cells, rim, config)
         if found is not None:
             taken |= region
             bins.append(found)
@@ -98,46 +110,136 @@ def _cells(plan: NDArray[np.float64], height: NDArray[np.float64], cell: float) 
     return _Plan(tops, origin, cell)
 
 
-def _rings(cells: _Plan, config: BinsConfig) -> Iterator[tuple[float, float, NDArray[np.float64]]]:
-    """What may be rims, at all heights: how complete each is, its height, and its hull."""
-    ndimage = import_library("scipy.ndimage")
-    around = np.ones((3, 3), dtype=bool)
+def _rings(cells: _Plan, config: BinsConfig) -> Iterator[_Rim]:
+    """What may be rims, at all heights."""
     for height in np.arange(config.least_height, config.most_height, config.step):
         band = np.abs(cells.tops - height) <= config.band
         if band.sum() * config.cell**2 < config.least_rim:
             continue
-        # Gaps of a few cells are pixels without depth.
-        labels, count = ndimage.label(ndimage.binary_dilation(band, around, config.gap), around)
-        for label in range(1, count + 1):
-            hull = cells.hull(band & (labels == label))
-            if hull is None:
-                continue
-            region = cells.filled(hull, config.cell / 2)
-            if region.sum() * config.cell**2 < config.area:
-                continue
-            edge = region & ~ndimage.binary_erosion(region, around, 2)
-            judged = edge & cells.in_view
-            inner = ndimage.binary_erosion(region, around, 3)
-            if judged.sum() < config.shown * edge.sum() or not inner.any():
-                continue
-            rim = float(np.median(cells.tops[edge & band]))
-            even = ndimage.binary_dilation(np.abs(cells.tops - rim) <= config.uneven, around)
-            complete = float(even[judged].mean())
-            hollow = float((cells.tops[inner] < rim - config.band).mean())
-            if complete >= config.complete and hollow >= config.hollow:
-                yield complete, rim, hull
+        for hull, least in (
+            *((hull, config.area) for hull in _hulls(cells, band, config)),
+            *((hull, config.rectangle) for hull in rectangles(cells.middles[band.ravel()], config)),
+        ):
+            rim = _rim(cells, band, hull, least, config)
+            if rim is not None:
+                yield rim
 
 
-def _bin(cells: _Plan, ring: NDArray[np.float64], rim: float, config: BinsConfig) -> Bin | None:
+def _hulls(cells: _Plan, band: Cells, config: BinsConfig) -> Iterator[NDArray[np.float64]]:
+    """The hull (m, 3) of each group of cells of one height."""
     ndimage = import_library("scipy.ndimage")
-    region = cells.filled(ring, -config.cell)
-    low = region & (np.abs(cells.tops) < config.low)
-    if low.sum() * config.cell**2 < config.seen:
+    # Gaps of a few cells are pixels without depth.
+    labels, count = ndimage.label(ndimage.binary_dilation(band, AROUND, config.gap), AROUND)
+    for label in range(1, count + 1):
+        hull = cells.hull(band & (labels == label))
+        if hull is not None:
+            yield hull
+
+
+def rectangles(points: NDArray[np.float64], config: BinsConfig) -> Iterator[NDArray[np.float64]]:
+    """Rectangles, hulls (4, 3), on whose sides many of the points (n, 2) lie, whatever lies
+    elsewhere.
+
+    In the direction of the sides, many points have one coordinate.
+    """
+    middle = points.mean(axis=0)
+    turns = np.arange(0.0, np.pi / 2, config.turn)
+    u, v = max(
+        (np.array([[np.cos(turn), np.sin(turn)], [-np.sin(turn), np.cos(turn)]]) for turn in turns),
+        key=lambda axes: _sharpness(points - middle, axes, config.cell),
+    )
+    x, y = (points - middle) @ u, (points - middle) @ v
+    for left, right in combinations(_sides(x, config), 2):
+        for near, far in combinations(_sides(y, config), 2):
+            if (right - left) * (far - near) < config.rectangle:
+                continue
+            on = np.minimum.reduce([abs(x - left), abs(x - right), abs(y - near), abs(y - far)])
+            within = (x > left) & (x < right) & (y > near) & (y < far)
+            on_sides = ((on < config.cell) & (within | (on < config.cell / 2))).sum()
+            if on_sides * config.cell < config.shown * (right - left + far - near):
+                continue
+            sides = [(u, right), (-u, -left), (v, far), (-v, -near)]
+            yield np.array([[*axis, -(side + axis @ middle)] for axis, side in sides])
+
+
+def _sharpness(points: NDArray[np.float64], axes: NDArray[np.float64], cell: float) -> float:
+    """How much points share their coordinates along both axes."""
+    return sum(float((np.square(_spread(along, cell)[0])).sum()) for along in axes @ points.T)
+
+
+def _spread(along: NDArray[np.float64], cell: float) -> tuple[NDArray[np.int64], float]:
+    """How many coordinates lie in each cell, and where the first one begins."""
+    first = float(along.min())
+    return np.bincount(((along - first) / cell).astype(np.int64)), first
+
+
+def _sides(along: NDArray[np.float64], config: BinsConfig) -> list[float]:
+    """The coordinates that most points share, in ascending order."""
+    counts, first = _spread(along, config.cell)
+    sides: list[float] = []
+    for index in np.argsort(-counts, kind="stable"):
+        at = first + (int(index) + 0.5) * config.cell
+        if all(abs(at - side) > config.apart for side in sides):
+            sides.append(at)
+        if len(sides) == config.sides:
+            break
+    return sorted(sides)
+
+
+def _rim(
+    cells: _Plan, band: Cells, hull: NDArray[np.float64], least: float, config: BinsConfig
+) -> _Rim | None:
+    """The rim along a hull (m, 3), if most of it is there and what it encloses is hollow.
+
+    What rises over it may hide it.
+    """
+    ndimage = import_library("scipy.ndimage")
+    region = cells.filled(hull, config.cell / 2)
+    if region.sum() * config.cell**2 < least:
         return None
+    edge = region & ~ndimage.binary_erosion(region, AROUND, 2)
+    inner = ndimage.binary_erosion(region, AROUND, 3)
+    judged = edge & cells.in_view
+    if judged.sum() < config.shown * edge.sum() or not inner.any() or not (edge & band).any():
+        return None
+    # A rectangle around a circle has nothing in its corners.
+    corners = cells.hull(edge & band)
+    if corners is None or cells.filled(corners, 0.0).sum() < config.corners * region.sum():
+        return None
+    height = float(np.median(cells.tops[edge & band]))
+    even = ndimage.binary_dilation(np.abs(cells.tops - height) <= config.uneven, AROUND)
+    hidden = (cells.tops > height + config.uneven) & ~even
+    there, open_ = int((judged & even).sum()), int((judged & ~hidden).sum())
+    # What rises over the rim may stand on the floor.
+    low, level = (
+        int((inner & (cells.tops < height + above)).sum()) for above in (-config.band, config.band)
+    )
+    if (
+        there < config.complete * open_
+        or there < config.shown * judged.sum()
+        or low < config.hollow * max(level, 1)
+    ):
+        return None
+    return _Rim(hull, height, there)
+
+
+def _bin(cells: _Plan, rim: _Rim, config: BinsConfig) -> Bin | None:
+    """None where nothing lies in it: then it is a thing itself."""
+    ndimage = import_library("scipy.ndimage")
+    region = cells.filled(rim.hull, -config.cell)
     # Walls that lean outwards are seen beyond the floor; what is hidden may be floor.
-    floor = ndimage.binary_opening(region & (cells.tops < config.low), np.ones((3, 3)))
-    inside = cells.hull(floor)
-    if inside is None:
+    low = cells.tops < config.low
+    inside = cells.hull(ndimage.binary_opening(region & low, AROUND))
+    held = cells.filled(inside, 0.0) if inside is not None else np.zeros_like(region)
+    if inside is None or held.sum() < config.floor_seen * region.sum():
+        # A heap hides the floor.
+        inside = rim.hull + np.array([0.0, 0.0, config.wall])
+        held = cells.filled(inside, 0.0)
+    floor = cells.tops[held & (np.abs(cells.tops) < config.low)]
+    level = float(np.median(floor)) if len(floor) * config.cell**2 >= config.least_floor else 0.0
+    # Not at its sides, where walls may begin.
+    lies = ndimage.binary_erosion(held, AROUND, 2) & (cells.tops > level + config.lies)
+    if lies.sum() * config.cell**2 < config.filled:
         return None
-    outside = ring + np.array([0.0, 0.0, -2 * config.cell])
-    return Bin(inside, outside, float(np.median(cells.tops[low])), rim)
+    outside = rim.hull + np.array([0.0, 0.0, -2 * config.cell])
+    return Bin(inside, outside, level, rim.height)
