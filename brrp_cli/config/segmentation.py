@@ -76,7 +76,8 @@ class BinsConfig:
     lies : what rises more over the floor lies in it; filled : metres squared of that, or the bin is
     empty, and a thing itself
     beside : how far beside the seen table a bin may reach; bled : how far depth bleeds beside its
-    walls; over : what rises so far over the rim is an object
+    walls; thick : how far within the rim they are seen at its height; lean : sine by which they do
+    over : what rises so far over the rim is an object
     """
 
     points: int = 100_000
@@ -105,6 +106,8 @@ class BinsConfig:
     filled: float = 0.0004
     beside: float = 0.1
     bled: float = 0.01
+    thick: float = 0.03
+    lean: float = 0.14
     over: float = 0.015
 
 

@@ -27,12 +27,13 @@ AROUND = np.ones((3, 3), dtype=bool)
 class Bin:
     """A bin on the table; hulls as `Table.hull`, in its plan.
 
-    inside : hull (m, 3) of the floor; outside : hull (m, 3) around the walls
+    inside : hull (m, 3) of the floor that is seen; outside : hull (m, 3) around it
     floor, rim : metres of the floor and of the walls' upper end above the table's plane
     """
 
     inside: NDArray[np.float64]
     outside: NDArray[np.float64]
+    around: float
     floor: float
     rim: float
 
@@ -129,8 +130,10 @@ def _hulls(cells: _Plan, band: Cells, config: BinsConfig) -> Iterator[NDArray[np
     """The hull (m, 3) of each group of cells of one height."""
     ndimage = import_library("scipy.ndimage")
     # Gaps of a few cells are pixels without depth.
-    labels, count = ndimage.label(ndimage.binary_dilation(band, AROUND, config.gap), AROUND)
-    for label in range(1, count + 1):
+    labels, _ = ndimage.label(ndimage.binary_dilation(band, AROUND, config.gap), AROUND)
+    for label, box in enumerate(ndimage.find_objects(labels), start=1):
+        if np.prod([side.stop - side.start for side in box]) * config.cell**2 < config.area:
+            continue
         hull = cells.hull(band & (labels == label))
         if hull is not None:
             yield hull
@@ -241,5 +244,6 @@ def _bin(cells: _Plan, rim: _Rim, config: BinsConfig) -> Bin | None:
     lies = ndimage.binary_erosion(held, AROUND, 2) & (cells.tops > level + config.lies)
     if lies.sum() * config.cell**2 < config.filled:
         return None
-    outside = rim.hull + np.array([0.0, 0.0, -2 * config.cell])
-    return Bin(inside, outside, level, rim.height)
+    around = 2 * config.cell
+    outside = rim.hull - np.array([0.0, 0.0, around])
+    return Bin(inside, outside, around, level, rim.height)

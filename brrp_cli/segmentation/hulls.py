@@ -27,3 +27,13 @@ def in_hull(
     for a, b, c in hull:
         inside &= a * x + b * y <= margin - c
     return inside
+
+
+def beyond_hull(hull: NDArray[np.float64], plan: NDArray[np.floating]) -> NDArray[np.float64]:
+    """(n,) how far plan points (n, 2) lie beyond the nearest side of a hull (m, 3); less than 0
+    inside."""
+    x, y = np.ascontiguousarray(plan[:, 0]), np.ascontiguousarray(plan[:, 1])
+    beyond = np.full(len(plan), -np.inf)
+    for a, b, c in hull:
+        np.maximum(beyond, a * x + b * y + c, out=beyond)
+    return beyond

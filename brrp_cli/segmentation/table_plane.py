@@ -13,7 +13,7 @@ from brrp_cli.errors import FrameError
 from brrp_cli.observation.support_plane import Plane, largest_plane
 from brrp_cli.seeds import child_rng, child_seed
 from brrp_cli.segmentation.bins import Bin, find_bins
-from brrp_cli.segmentation.hulls import convex_hull, in_hull
+from brrp_cli.segmentation.hulls import beyond_hull, convex_hull, in_hull
 
 
 @dataclass(frozen=True)
@@ -52,13 +52,17 @@ class Table:
     ) -> NDArray[np.bool_]:
         """(n,) which of plan points (n, 2) at `height` (n,) are a bin's walls, not what it holds.
 
-        What rises over the rim is no wall.
+        A wall leans outwards by a little, so that it is near the rim; what rises over the rim, or
+        lies over the floor that is seen, is no wall.
         """
         walls = np.zeros(len(plan), dtype=bool)
         for each in self.bins:
-            low = height < each.rim - each.floor + config.over
-            around = in_hull(each.outside, plan, config.bled)
-            walls |= around & low & ~in_hull(each.inside, plan, 0.0)
+            near = np.flatnonzero(in_hull(each.outside, plan, config.bled))
+            below = each.rim - each.floor - height[near]
+            reach = each.around + config.thick + config.lean * np.maximum(below, 0.0)
+            wall = (below > -config.over) & (-beyond_hull(each.outside, plan[near]) < reach)
+            wall &= ~in_hull(each.inside, plan[near], 0.0)
+            walls[near[wall]] = True
         return walls
 
 

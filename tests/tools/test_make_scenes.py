@@ -11,15 +11,17 @@ pytest.importorskip("pybullet")
 
 from make_scenes import main
 from tabletop import check
+from tabletop.bin import draw_bin
 from tabletop.camera import FAR, NEAR, perspective
 from tabletop.models import find_meshes, load_model
 from tabletop.scene import Plan, make_scene, noisy_buffer
-from tabletop.settle import drop
+from tabletop.settle import drop, rotation
 from tabletop.stack import stack
 
 from brrp_cli.errors import MeshError, SceneError
 from brrp_cli.geometry import transform_points
 from brrp_cli.ground_truth.scenes import find_scenes, true_mesh
+from brrp_cli.seeds import child_rng
 
 SIZE = "160x120"
 
@@ -136,6 +138,51 @@ def test_frames_show_the_objects_where_they_are(data, made):
                 color = np.median(frame.rgb[frame.segmap == object_id], axis=0)
                 assert color.argmax() == colors[truth.name]
     assert seen >= 4
+
+
+def test_objects_lie_in_a_bin_that_is_background(data):
+    options = ("--scenes", 2, "--views", 1, "--elevation", 60, 80, "--bin")
+    for folder in ("binned", "binned_again"):
+        result = generate(data, data / folder, *options)
+        assert result.exit_code == 0, result.output
+    assert bytes_of(data / "binned") == bytes_of(data / "binned_again")
+    for number, scene in enumerate(find_scenes(data / "binned")):
+        box = draw_bin(child_rng(0, "scene", number, "bin"))
+        floor, walls = box.panels()[0], box.panels()[1:]
+        lowest = [true_mesh(o, data).bounds[0, 2] for o in scene.objects]
+        assert min(lowest) == pytest.approx(box.thickness, abs=0.002)
+        turned = rotation(floor.orientation)
+        for each in scene.objects:
+            inside = np.abs(true_mesh(each, data).vertices @ turned)[:, :2]
+            assert (inside.max(axis=0) < floor.half[:2] + box.height * np.tan(box.lean)).all()
+        frame = scene.view(0)
+        points = transform_points(frame.T_world_cam, frame.points[frame.valid].astype(np.float64))
+        on_wall = np.zeros(len(points), bool)
+        for wall in walls:
+            local = np.abs((points - wall.position) @ rotation(wall.orientation))
+            on_wall |= (local < wall.half + 1e-3).all(axis=1)
+        assert on_wall.sum() > 300
+        assert (frame.segmap[frame.valid][on_wall & (points[:, 2] > 0.02)] == 0).mean() > 0.97
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_bins_walls_stand_around_its_floor(seed):
+    box = draw_bin(np.random.default_rng(seed))
+    floor, *walls = box.panels()
+    assert floor.position[2] - floor.half[2] == pytest.approx(0)
+    for wall in walls:
+        up = rotation(wall.orientation)[:, 2]
+        assert np.arccos(up[2]) == pytest.approx(box.lean, abs=1e-6)
+        assert up[:2] @ wall.position[:2] >= -1e-9, "outwards"
+        foot = wall.position - up * wall.half[2]
+        assert foot[2] == pytest.approx(0, abs=1e-9)
+    spans = {round(float(np.linalg.norm(wall.position[:2])), 6) for wall in walls}
+    assert len(spans) == 2
+
+
+def test_bins_and_stacks_exclude_each_other(data):
+    result = generate(data, data / "both", "--bin", "--stack")
+    assert result.exit_code == 2 and "exclude each other" in result.output
 
 
 def test_objects_lie_on_the_table(data, made):
