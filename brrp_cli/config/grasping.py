@@ -2,10 +2,25 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from brrp_cli.config.ranges import between, share
 from brrp_cli.physics import DENSITY
+
+
+@dataclass(frozen=True)
+class SurroundingsConfig:
+    """Observed points of no object that a hand keeps out of, such as those of a bin's walls.
+
+    rises : what is lower over the table is the table; reach : of what is farther from all objects a
+    hand cannot get to; beside : what is nearer to an object may be depth that bled from it; cell :
+    of the grid that they are thinned on
+    """
+
+    rises: float = 0.02
+    reach: float = 0.25
+    beside: float = 0.02
+    cell: float = 0.008
 
 
 @dataclass(frozen=True)
@@ -45,7 +60,8 @@ class GraspConfig:
     neighbour_nodes : of the grid on which those of recognised objects are found; one of
     `SurfaceConfig.around_nodes` takes six times as long and lies 0.03 mm further out on average;
     neighbour_vertices : in place of `SurfaceConfig.alike_vertices`
-    loose : observed points of objects without a mesh that the hand keeps out of, at most
+    loose : observed points of objects without a mesh, and of the `surroundings`, that the hand
+    keeps out of, at most
     friction : Coulomb's coefficient between fingers and object; askew : how probably a contact
     holds that a finger meets edge on, as far outside of the friction cone as can be
     density, lightest : kg / m3 of the mesh's volume, and kg: what an object is taken to weigh;
@@ -88,6 +104,7 @@ class GraspConfig:
     neighbour_nodes: int = 150_000
     neighbour_vertices: int = 2_000
     loose: int = 2_000
+    surroundings: SurroundingsConfig = field(default_factory=SurroundingsConfig)
     friction: float = 0.5
     askew: float = share(0.5)
     density: float = DENSITY

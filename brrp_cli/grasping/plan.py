@@ -59,7 +59,7 @@ def plan_grasps(
         raise BrrpError("No such approach", found=approach, expected=", ".join(APPROACHES))
     config = GraspConfig() if config is None else config
     hand = gripper if isinstance(gripper, Gripper) else open_gripper(gripper)
-    scene = result if isinstance(result, GraspScene) else scene_of(result)
+    scene = result if isinstance(result, GraspScene) else scene_of(result, config)
     workers = cores() if workers is None else workers
 
     def shape(item: GraspObject) -> Mesh:

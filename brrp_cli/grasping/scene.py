@@ -8,9 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brrp_cli.config import SurfaceConfig
+from brrp_cli.config.grasping import GraspConfig, SurroundingsConfig
 from brrp_cli.config.tables import changed
 from brrp_cli.errors import ResultError
+from brrp_cli.frames.frame import Frame
 from brrp_cli.geometry import transform_points
+from brrp_cli.grasping.standing_around import standing_around
 from brrp_cli.observation.support_plane import Plane
 from brrp_cli.reconstruction import OccupancyPosterior, Reconstruction
 from brrp_cli.results.read import StoredResult
@@ -35,7 +38,8 @@ class GraspObject:
 @dataclass(frozen=True)
 class GraspScene:
     """objects : those that have a mesh; plane : the table, camera frame; without : why others have
-    none, by id; loose : (n, 3) observed points of those; surface : how meshes were made"""
+    none, by id; loose : (n, 3) observed points of those, and of what stands around; surface : how
+    meshes were made"""
 
     objects: list[GraspObject]
     plane: Plane | None
@@ -49,12 +53,18 @@ class GraspScene:
         return IMAGE_UP if self.plane is None else np.asarray(self.plane.normal, dtype=np.float64)
 
 
-def scene_of(result: Reconstruction | StoredResult) -> GraspScene:
+def scene_of(
+    result: Reconstruction | StoredResult, config: GraspConfig | None = None
+) -> GraspScene:
     """The scene of a reconstruction, or of a folder of results.
 
     Errors: ResultError where no object has a mesh; those of reading the folder.
     """
-    scene = _stored(result) if isinstance(result, StoredResult) else _computed(result)
+    around = (config or GraspConfig()).surroundings
+    if isinstance(result, StoredResult):
+        scene = _stored(result, around)
+    else:
+        scene = _computed(result, around)
     if not scene.objects:
         raise ResultError(
             "No object of the results has a mesh, so that there is nothing to grasp",
@@ -66,7 +76,7 @@ def scene_of(result: Reconstruction | StoredResult) -> GraspScene:
     return scene
 
 
-def _stored(stored: StoredResult) -> GraspScene:
+def _stored(stored: StoredResult, around: SurroundingsConfig) -> GraspScene:
     T_cam_frame = np.linalg.inv(stored.T_frame_cam)
     objects = [
         GraspObject(
@@ -83,11 +93,11 @@ def _stored(stored: StoredResult) -> GraspScene:
         for item in stored.record["objects"]
         if item["mesh"] is None
     }
-    loose = [stored.frame.object_points(i) for i in without]
-    return GraspScene(objects, stored.plane_cam, without, _joined(loose), stored.surface_config)
+    loose = _loose(stored.frame, stored.plane_cam, objects, without, around)
+    return GraspScene(objects, stored.plane_cam, without, loose, stored.surface_config)
 
 
-def _computed(result: Reconstruction) -> GraspScene:
+def _computed(result: Reconstruction, around: SurroundingsConfig) -> GraspScene:
     objects = [
         GraspObject(
             each.object_id,
@@ -100,11 +110,25 @@ def _computed(result: Reconstruction) -> GraspScene:
         if each.surface is not None
     ]
     without = {o.object_id: o.message or o.status for o in result.objects if o.surface is None}
-    loose = [result.frame.object_points(i) for i in without]
+    loose = _loose(result.frame, result.plane, objects, without, around)
     table = result.configuration.get("surface", {})
     surface = changed(SurfaceConfig(), table, "the reconstruction", "surface.")
-    return GraspScene(objects, result.plane, without, _joined(loose), surface)
+    return GraspScene(objects, result.plane, without, loose, surface)
 
 
-def _joined(clouds: list[NDArray[np.float32]]) -> Array:
+def _loose(
+    frame: Frame,
+    plane: Plane | None,
+    objects: list[GraspObject],
+    without: dict[int, str],
+    config: SurroundingsConfig,
+) -> Array:
+    """(n, 3) observed points that a hand keeps out of: of objects without a mesh, and of none."""
+    clouds = [frame.object_points(i) for i in without]
+    surfaces = [each for item in objects for each in (item.vertices, item.observed)]
+    around = standing_around(frame, plane, _joined([*surfaces, *clouds]), config)
+    return _joined([*clouds, around])
+
+
+def _joined(clouds: list[NDArray[np.floating]]) -> Array:
     return np.concatenate([np.zeros((0, 3)), *clouds]).astype(np.float64)

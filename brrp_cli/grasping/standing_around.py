@@ -1,0 +1,37 @@
+"""What stands around the objects and is none of them: walls of a bin, posts, what was left out."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brrp_cli.config.grasping import SurroundingsConfig
+from brrp_cli.config.segmentation import SmoothDepthConfig
+from brrp_cli.dependencies import import_library
+from brrp_cli.frames.frame import BACKGROUND, Frame
+from brrp_cli.observation.subsample import grid_subsample
+from brrp_cli.observation.support_plane import Plane
+from brrp_cli.segmentation.smooth_depth import flying_pixels
+
+Array = NDArray[np.float64]
+
+
+def standing_around(
+    frame: Frame, plane: Plane | None, objects: NDArray[np.floating], config: SurroundingsConfig
+) -> Array:
+    """(n, 3) observed points of no object that rise from the table within a hand's reach of the
+    objects; metres, camera frame. None without a table, which could be told from nothing.
+
+    objects : (m, 3) points of their surfaces. Depth bleeds over silhouettes, so that what is nearer
+    to an object may be its own.
+    """
+    if plane is None or not len(objects):
+        return np.zeros((0, 3))
+    depth = np.where(frame.valid, frame.points[..., 2], np.nan)
+    seen = frame.valid & ~flying_pixels(depth, SmoothDepthConfig())
+    points = frame.points[seen & (frame.segmap == BACKGROUND)].astype(np.float64)
+    points = points[plane.signed_distance(points) > config.rises]
+    tree = import_library("scipy.spatial").cKDTree(grid_subsample(objects, config.cell))
+    points = grid_subsample(points, config.cell).astype(np.float64)
+    distance, _ = tree.query(points, distance_upper_bound=config.reach)
+    return np.asarray(points[(distance > config.beside) & np.isfinite(distance)])
