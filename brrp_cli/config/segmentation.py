@@ -59,7 +59,7 @@ class TableConfig:
 class BinsConfig:
     """Bins, totes and trays: walls of one height around a floor. Lengths are metres.
 
-    points : about so many are looked at, at least
+    points : about so many are looked at, at least; widest : on a larger table none is looked for
     cell : of the plan's grid; step : of the heights of rims that are tried, from `least_height` to
     `most_height` above the table; band : what is that far above or below may be of the same rim;
     uneven : how far a rim may be above or below its own median
@@ -81,6 +81,7 @@ class BinsConfig:
     """
 
     points: int = 100_000
+    widest: float = 4.0
     cell: float = 0.01
     step: float = 0.02
     least_height: float = 0.04

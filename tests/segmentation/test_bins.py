@@ -12,6 +12,8 @@ from brrp_cli.demo.layout import camera_pose, turn
 from brrp_cli.frames.build import make_frame
 from brrp_cli.frames.frame import Frame
 from brrp_cli.geometry import similarity, transform_points
+from brrp_cli.segmentation.bins import find_bins
+from brrp_cli.segmentation.rectangles import rectangles
 from brrp_cli.segmentation.seen_surfaces import SeenSurfaces, see_surfaces
 from brrp_cli.segmentation.segment import segment
 from brrp_cli.shapes import solids
@@ -122,8 +124,8 @@ def test_a_bin_of_which_a_wall_has_no_depth_is_one():
     whole = seen(standing((0.08, 0.06, 0.07), 0.0, 0.0))
     near = np.zeros(whole.shape, bool)
     near[165:] = True  # the lower part of the image: the nearest wall and its corners
-    assert len(surfaces(whole).table.bins) == 1
-    assert len(surfaces(seen(standing((0.08, 0.06, 0.07), 0.0, 0.0), without_depth=near)).table.bins) == 1  # fmt: skip  # noqa: E501
+    part = seen(standing((0.08, 0.06, 0.07), 0.0, 0.0), without_depth=near)
+    assert [len(surfaces(frame).table.bins) for frame in (whole, part)] == [1, 1]
 
 
 def test_a_bin_that_the_border_cuts_is_one():
@@ -145,3 +147,33 @@ def test_bowls_and_heaps_of_boxes_are_no_bins():
     ]
     frame = seen(*around[1:], bin=around[0])
     assert surfaces(frame).table.bins == ()
+
+
+def test_an_empty_bin_is_a_thing():
+    frame = seen()
+    assert surfaces(frame).table.bins == ()
+    assert segment(frame).max() >= 1
+
+
+def test_on_a_table_of_any_size_nothing_breaks():
+    rng = np.random.default_rng(0)
+    plan = rng.uniform(-1e6, 1e6, (1000, 2))
+    assert find_bins(plan, rng.uniform(0, 0.4, 1000), CONFIG.bins) == ()
+    assert find_bins(plan[:0], np.zeros(0), CONFIG.bins) == ()
+    assert find_bins(np.zeros((5, 2)), np.full(5, 0.1), CONFIG.bins) == ()
+
+
+@pytest.mark.parametrize("turn_by", [0.0, 0.4, 1.2])
+def test_a_rectangle_is_found_among_other_points(turn_by):
+    rng = np.random.default_rng(1)
+    x, y = np.arange(-0.2, 0.2, 0.01), np.arange(-0.15, 0.15, 0.01)
+    sides = [np.stack([x, np.full_like(x, s * 0.15)], 1) for s in (-1, 1)]
+    sides += [np.stack([np.full_like(y, s * 0.2), y], 1) for s in (-1, 1)]
+    others = rng.uniform(-0.3, 0.3, (40, 2))
+    R = np.array([[np.cos(turn_by), -np.sin(turn_by)], [np.sin(turn_by), np.cos(turn_by)]])
+    points = np.concatenate([*sides, others]) @ R.T + [0.5, -0.2]
+    corners = np.array([[s * 0.2, t * 0.15] for s in (-1, 1) for t in (-1, 1)]) @ R.T + [0.5, -0.2]
+    found = list(rectangles(points, CONFIG.bins))
+    # Each corner of the true one lies on two of its sides.
+    off = [np.sort(np.abs(corners @ h[:, :2].T + h[:, 2]), axis=1)[:, :2].max() for h in found]
+    assert min(off) < 0.02

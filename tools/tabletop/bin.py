@@ -43,14 +43,8 @@ class Bin:
         # Walls that lean outwards are longer above than below: what is too long sticks out.
         spread = 2 * self.height * np.sin(self.lean) + 2 * self.thickness
         for number in range(4):
-            across, along = (
-                (self.length, self.width)
-                if number % 2 == 0
-                else (
-                    self.width,
-                    self.length,
-                )
-            )
+            sides = (self.length, self.width)
+            across, along = sides if number % 2 == 0 else sides[::-1]
             side = Rotation.from_euler("z", number * np.pi / 2)
             lean = Rotation.from_euler("y", self.lean)
             foot = np.array([across / 2 + half, 0.0, 0.0])
