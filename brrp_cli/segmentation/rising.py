@@ -35,10 +35,10 @@ def rising_in(_frame: Frame, seen: SeenSurfaces, config: SegmentConfig) -> Risin
 def rising(seen: SeenSurfaces, config: SegmentConfig) -> Rising:
     """What rises in a frame."""
     lift = _lift(seen.height, seen.depth, config)
-    on_table = np.zeros(seen.valid.shape, dtype=bool)
-    plan, height = seen.plan[seen.valid], seen.height[seen.valid]
-    on_table[seen.valid] = seen.table.holds(plan, config.margin)
-    on_table[seen.valid] &= ~seen.table.walls(plan, height, config.bins)
+    on_table = seen.beside <= config.margin
+    on_table[on_table] = ~seen.table.walls(
+        seen.plan[on_table], seen.height[on_table], config.bins
+    )
     with np.errstate(invalid="ignore"):
         return Rising(
             on_table & (seen.height > lift),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +12,7 @@ from brrp_cli.errors import FrameError
 from brrp_cli.frames.frame import Frame
 from brrp_cli.frames.last_frame import kept_for_last_image
 from brrp_cli.geometry import backproject
+from brrp_cli.segmentation.bins import find_bins
 from brrp_cli.segmentation.concave_edges import depth_jumps, hollow_angles, surface_normals
 from brrp_cli.segmentation.smooth_depth import flying_pixels, smooth_depth
 from brrp_cli.segmentation.table_plane import Table, find_table
@@ -27,7 +28,8 @@ class SeenSurfaces:
     """What a frame shows, after depth was smoothed and flying pixels were left out.
 
     depth : (H, W) metres, NaN = none; points : (H, W, 3) metres, camera frame; valid : (H, W)
-    height : (H, W) metres above the table or a floor of a bin; plan : (H, W, 2) metres, on it
+    height : (H, W) metres above the table or a floor of a bin; plan : (H, W, 2) metres, on it;
+    beside : (H, W) metres beside the table, 0 or less on it; NaN where there is no depth
     normals : (H, W, 3) unit, toward the camera; angles : (H, W) degrees of hollow creases; jumps :
     (H, W) pixels beside which depth jumps
     """
@@ -38,6 +40,7 @@ class SeenSurfaces:
     table: Table
     height: NDArray[np.float64]
     plan: NDArray[np.float64]
+    beside: NDArray[np.float64]
     normals: Array
     angles: Array
     jumps: NDArray[np.bool_]
@@ -58,15 +61,20 @@ def see_surfaces(frame: Frame, seed: int, config: SegmentConfig) -> SeenSurfaces
             f" {int(valid.sum())} of them agree with their neighbours",
             fix="check the depth image and its unit; masks made elsewhere go in by --masks",
         )
-    table = find_table(points[valid], seed, frame.source, config.table, config.bins)
+    table = find_table(points[valid], seed, frame.source, config.table)
+    plan, height = table.plan(points), table.plane.signed_distance(points)
+    beside = table.beside(plan)
+    near = beside <= config.bins.beside
+    table = replace(table, bins=find_bins(plan[near], height[near], config.bins))
     normals = surface_normals(points, config.concave_edges)
     return SeenSurfaces(
         depth,
         points,
         valid,
         table,
-        table.height(points),
-        table.plan(points),
+        table.above_floors(plan, height),
+        plan,
+        beside,
         normals,
         hollow_angles(points, normals, config.concave_edges),
         depth_jumps(depth, frame.K, config.concave_edges),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +12,7 @@ from brrp_cli.dependencies import import_library
 from brrp_cli.errors import FrameError
 from brrp_cli.observation.support_plane import Plane, largest_plane
 from brrp_cli.seeds import child_rng, child_seed
-from brrp_cli.segmentation.bins import Bin, find_bins
+from brrp_cli.segmentation.bins import Bin
 from brrp_cli.segmentation.hulls import beyond_hull, convex_hull, in_hull
 
 
@@ -39,13 +39,24 @@ class Table:
         """(n,) whether plan points (n, 2) lie on the table or at most `margin` beside it."""
         return in_hull(self.hull, plan, margin)
 
+    def beside(self, plan: NDArray[np.floating]) -> NDArray[np.float64]:
+        """(...,) how far beside the table plan points (..., 2) lie, metres; 0 or less on it."""
+        return beyond_hull(self.hull, plan.reshape(-1, 2)).reshape(plan.shape[:-1])
+
     def height(self, points: NDArray[np.floating]) -> NDArray[np.float64]:
         """(...,) metres above the table, or above the floor of a bin, of points (..., 3)."""
         height = self.plane.signed_distance(points)
-        flat, plan = height.reshape(-1), self.plan(points).reshape(-1, 2)
+        return self.above_floors(self.plan(points), height) if self.bins else height
+
+    def above_floors(
+        self, plan: NDArray[np.floating], height: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """(...,) metres above the table, or above the floor of a bin, of plan points (..., 2) at
+        `height` (...,) above the table's plane."""
+        above, flat = height.copy(), plan.reshape(-1, 2)
         for each in self.bins:
-            flat[in_hull(each.outside, plan, 0.0)] -= each.floor
-        return height
+            above.reshape(-1)[in_hull(each.outside, flat, 0.0)] -= each.floor
+        return above
 
     def walls(
         self, plan: NDArray[np.floating], height: NDArray[np.floating], config: BinsConfig
@@ -71,9 +82,8 @@ def find_table(
     seed: int,
     source: object,
     config: TableConfig,
-    bins: BinsConfig | None = None,
 ) -> Table:
-    """The support plane of points (n, 3), metres, camera frame.
+    """The support plane of points (n, 3), metres, camera frame; bins are not looked for.
 
     The planes with most points are found one after the other (RANSAC). The table is the largest,
     or, where a floor is larger, a plane that lies well above it, is parallel to it and has a
@@ -81,7 +91,6 @@ def find_table(
 
     source : for messages. Errors: FrameError if no plane holds `config.least` of the points.
     """
-    every = points
     if len(points) > config.points:
         drawn = child_rng(seed, "table").choice(len(points), config.points, replace=False)
         points = points[drawn]
@@ -101,12 +110,7 @@ def find_table(
     hull = convex_hull(_largest_patch(on, config.cell))
     if hull is None:
         raise FrameError("The support plane has no extent", where=source)
-    table = Table(plane=plane, axes=axes, hull=hull)
-    if bins is None:
-        return table
-    plan = table.plan(every)
-    near = table.holds(plan, bins.beside)
-    return replace(table, bins=find_bins(plan[near], plane.signed_distance(every[near]), bins))
+    return Table(plane=plane, axes=axes, hull=hull)
 
 
 def _largest_planes(
