@@ -78,6 +78,7 @@ class BinsConfig:
     beside : how far beside the seen table a bin may reach; bled : how far depth bleeds beside its
     walls; thick : how far within the rim they are seen at its height; lean : sine by which they do
     over : what rises so far over the rim is an object
+    board : thickness of walls that are made solid
     """
 
     points: int = 100_000
@@ -110,6 +111,7 @@ class BinsConfig:
     thick: float = 0.03
     lean: float = 0.14
     over: float = 0.015
+    board: float = 0.01
 
 
 @dataclass(frozen=True)

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from brrp_cli.config import SurfaceConfig
 from brrp_cli.config.grasping import GraspConfig
-from brrp_cli.dependencies import import_open3d
+from brrp_cli.dependencies import import_library, import_open3d
 from brrp_cli.geometry import similarity
 from brrp_cli.grasping.scene import GraspObject
 from brrp_cli.inference.hypothesis_posterior import HypothesisPosterior
@@ -47,6 +47,12 @@ class Mesh:
     def scene(self) -> Any:
         """It alone as Embree knows it; made once, for that takes longer than to ask it."""
         return surface_scene(self.vertices, self.faces)
+
+
+def wall_mesh(corners: Array) -> Mesh:
+    """The hull of corners (k, 3)."""
+    hull = import_library("trimesh").convex.convex_hull(corners)
+    return Mesh(np.asarray(hull.vertices, dtype=np.float64), np.asarray(hull.faces))
 
 
 @dataclass(frozen=True)

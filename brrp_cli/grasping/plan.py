@@ -17,7 +17,7 @@ from brrp_cli.errors import BrrpError
 from brrp_cli.geometry import transform_points
 from brrp_cli.grasping.candidates import Poses, antipodal_pairs, comes_from, hand_poses, lifted_off
 from brrp_cli.grasping.closing import Closed, close_on
-from brrp_cli.grasping.draws import Mesh, SurfaceDraws, draw_surfaces, mesh_alone
+from brrp_cli.grasping.draws import Mesh, SurfaceDraws, draw_surfaces, mesh_alone, wall_mesh
 from brrp_cli.grasping.grasp import Grasp, GraspPlan, ObjectGrasps, worth
 from brrp_cli.grasping.gripper import Gripper
 from brrp_cli.grasping.gripper_file import DEFAULT, open_gripper
@@ -65,7 +65,7 @@ def plan_grasps(
     def shape(item: GraspObject) -> Mesh:
         return collision_shape(item, scene, config)
 
-    shapes = list(in_threads(shape, scene.objects, workers))
+    shapes = [*in_threads(shape, scene.objects, workers), *map(wall_mesh, scene.walls)]
     planned = [
         _Task(item, i, scene, shapes, hand, config, approach, per_object, min_score, seed)
         for i, item in enumerate(scene.objects)
@@ -95,7 +95,7 @@ def collision_shape(item: GraspObject, scene: GraspScene, config: GraspConfig) -
 
 @dataclass(frozen=True)
 class _Task:
-    """One object of a scene, the `number`-th, and the shapes of all."""
+    """One object of a scene, the `number`-th, and the shapes of all, then of walls."""
 
     item: GraspObject
     number: int

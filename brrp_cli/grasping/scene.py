@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,6 +10,7 @@ from numpy.typing import NDArray
 
 from brrp_cli.config import SurfaceConfig
 from brrp_cli.config.grasping import GraspConfig, SurroundingsConfig
+from brrp_cli.config.segmentation import SegmentConfig
 from brrp_cli.config.tables import changed
 from brrp_cli.errors import ResultError
 from brrp_cli.frames.frame import Frame
@@ -17,6 +19,7 @@ from brrp_cli.grasping.standing_around import standing_around
 from brrp_cli.observation.support_plane import Plane
 from brrp_cli.reconstruction import OccupancyPosterior, Reconstruction
 from brrp_cli.results.read import StoredResult
+from brrp_cli.segmentation.bin_walls import Wall, bin_walls, segmentation_of
 
 Array = NDArray[np.float64]
 # Up in the image, where no table says it.
@@ -39,13 +42,14 @@ class GraspObject:
 class GraspScene:
     """objects : those that have a mesh; plane : the table, camera frame; without : why others have
     none, by id; loose : (n, 3) observed points of those, and of what stands around; surface : how
-    meshes were made"""
+    meshes were made; walls : corners (8, 3) of the walls of bins, convex, camera frame"""
 
     objects: list[GraspObject]
     plane: Plane | None
     without: dict[int, str]
     loose: Array
     surface: SurfaceConfig
+    walls: Sequence[Wall] = ()
 
     @property
     def up(self) -> Array:
@@ -93,8 +97,10 @@ def _stored(stored: StoredResult, around: SurroundingsConfig) -> GraspScene:
         for item in stored.record["objects"]
         if item["mesh"] is None
     }
-    loose = _loose(stored.frame, stored.plane_cam, objects, without, around)
-    return GraspScene(objects, stored.plane_cam, without, loose, stored.surface_config)
+    plane, masks = stored.plane_cam, segmentation_of(stored.record["segmentation"])
+    loose = _loose(stored.frame, plane, objects, without, around, masks)
+    walls = _walls(stored.frame, plane, stored.record["seed"], masks)
+    return GraspScene(objects, plane, without, loose, stored.surface_config, walls)
 
 
 def _computed(result: Reconstruction, around: SurroundingsConfig) -> GraspScene:
@@ -110,10 +116,17 @@ def _computed(result: Reconstruction, around: SurroundingsConfig) -> GraspScene:
         if each.surface is not None
     ]
     without = {o.object_id: o.message or o.status for o in result.objects if o.surface is None}
-    loose = _loose(result.frame, result.plane, objects, without, around)
+    masks = segmentation_of(result.segmentation)
+    loose = _loose(result.frame, result.plane, objects, without, around, masks)
     table = result.configuration.get("surface", {})
     surface = changed(SurfaceConfig(), table, "the reconstruction", "surface.")
-    return GraspScene(objects, result.plane, without, loose, surface)
+    walls = _walls(result.frame, result.plane, result.seed, masks)
+    return GraspScene(objects, result.plane, without, loose, surface, walls)
+
+
+def _walls(frame: Frame, plane: Plane | None, seed: int, masks: SegmentConfig) -> list[Wall]:
+    bins = [] if plane is None else bin_walls(frame, seed, masks)
+    return [wall for walls in bins for wall in walls]
 
 
 def _loose(
@@ -122,11 +135,13 @@ def _loose(
     objects: list[GraspObject],
     without: dict[int, str],
     config: SurroundingsConfig,
+    masks: SegmentConfig,
 ) -> Array:
     """(n, 3) observed points that a hand keeps out of: of objects without a mesh, and of none."""
     clouds = [frame.object_points(i) for i in without]
     surfaces = [each for item in objects for each in (item.vertices, item.observed)]
-    around = standing_around(frame, plane, _joined([*surfaces, *clouds]), config)
+    known = _joined([*surfaces, *clouds])
+    around = standing_around(frame, plane, known, config, masks.smooth_depth)
     return _joined([*clouds, around])
 
 

@@ -17,18 +17,22 @@ Array = NDArray[np.float64]
 
 
 def standing_around(
-    frame: Frame, plane: Plane | None, objects: NDArray[np.floating], config: SurroundingsConfig
+    frame: Frame,
+    plane: Plane | None,
+    objects: NDArray[np.floating],
+    config: SurroundingsConfig,
+    smooth: SmoothDepthConfig,
 ) -> Array:
     """(n, 3) observed points of no object that rise from the table within a hand's reach of the
     objects; metres, camera frame. None without a table, which could be told from nothing.
 
-    objects : (m, 3) points of their surfaces. Depth bleeds over silhouettes, so that what is nearer
-    to an object may be its own.
+    objects : (m, 3) points of their surfaces; smooth : which pixels fly, and are none. Depth bleeds
+    over silhouettes, so that what is nearer to an object may be its own.
     """
     if plane is None or not len(objects):
         return np.zeros((0, 3))
     depth = np.where(frame.valid, frame.points[..., 2], np.nan)
-    seen = frame.valid & ~flying_pixels(depth, SmoothDepthConfig())
+    seen = frame.valid & ~flying_pixels(depth, smooth)
     points = frame.points[seen & (frame.segmap == BACKGROUND)].astype(np.float64)
     points = points[plane.signed_distance(points) > config.rises]
     tree = import_library("scipy.spatial").cKDTree(grid_subsample(objects, config.cell))

@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from brrp_cli.planning.body import Body
-from brrp_cli.planning.mjcf import Table
+from brrp_cli.planning.mjcf import BIN_COLOUR, Table
 from brrp_cli.planning.numbers import quaternion_wxyz
 from brrp_cli.planning.union import union_of_hulls
 
 
 def curobo_world(bodies: Mapping[str, Body], table: Table | None, frame: str) -> str:
-    """YAML for `curobo.geom.types.WorldConfig.from_dict`: a mesh for each body, a cuboid as table.
+    """YAML for `curobo.geom.types.WorldConfig.from_dict`: a mesh for each body and each bin, a
+    cuboid as table.
 
     Poses are x y z qw qx qy qz in metres. The meshes stand in the file itself: cuRobo looks for
     files below a folder of its own. A body's parts are joined into one closed surface, since cuRobo
@@ -30,17 +31,28 @@ def curobo_world(bodies: Mapping[str, Body], table: Table | None, frame: str) ->
         ]
     lines.append("mesh:")
     for name, body in bodies.items():
-        vertices, faces = union_of_hulls(body.parts)
-        lines += [
-            f"  {name}:",
-            f"    pose: {_pose(body.T_frame_body)}",
-            f"    color: {_row([*body.colour, 1.0])}",
-            "    vertices:",
-            *(f"    - {_row(vertex)}" for vertex in vertices),
-            "    faces:",
-            *(f"    - [{a}, {b}, {c}]" for a, b, c in faces),
-        ]
+        lines += _mesh(name, body.T_frame_body, body.colour, body.parts)
+    for name, walls in ({} if table is None else table.bins).items():
+        lines += _mesh(name, np.eye(4), BIN_COLOUR, walls)
     return "\n".join(lines) + "\n"
+
+
+def _mesh(
+    name: str,
+    T: NDArray[np.float64],
+    colour: Iterable[float],
+    parts: Sequence[NDArray[np.float64]],
+) -> list[str]:
+    vertices, faces = union_of_hulls(parts)
+    return [
+        f"  {name}:",
+        f"    pose: {_pose(T)}",
+        f"    color: {_row([*colour, 1.0])}",
+        "    vertices:",
+        *(f"    - {_row(vertex)}" for vertex in vertices),
+        "    faces:",
+        *(f"    - [{a}, {b}, {c}]" for a, b, c in faces),
+    ]
 
 
 def _pose(T: NDArray[np.float64]) -> str:

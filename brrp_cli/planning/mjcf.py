@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import xml.etree.ElementTree as ET
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,16 +16,21 @@ from brrp_cli.planning.numbers import quaternion_wxyz, spell
 
 # Meshes are drawn from group 2 and collide in group 3, as MuJoCo's viewer expects it.
 VISUAL, COLLISION = "2", "3"
+BIN_COLOUR = (0.6, 0.6, 0.65)  # RGB, 0 to 1
 CLEARANCE = 0.0005  # metres between the table and what is put on it
 
 
 @dataclass(frozen=True)
 class Table:
-    """A box whose top is the support plane: T_frame_table (4, 4) of its centre, z its normal;
-    size (3,) metres, edge to edge."""
+    """A box whose top is the support plane, and the bins on it.
+
+    T_frame_table : (4, 4) of the box's centre, z its normal; size : (3,) metres, edge to edge
+    bins : by name, corners (8, 3) of the walls of each, convex, metres, frame of the results
+    """
 
     T_frame_table: NDArray[np.float64]
     size: NDArray[np.float64]
+    bins: Mapping[str, Sequence[NDArray[np.float64]]] = field(default_factory=dict)
 
     @property
     def up(self) -> NDArray[np.float64]:
@@ -72,6 +77,8 @@ def scene_mjcf(
         place = ET.SubElement(world, "body", {"name": "table", **_pose(table.T_frame_table)})
         half = spell(table.size / 2)
         ET.SubElement(place, "geom", name="table", type="box", size=half, rgba="0.7 0.66 0.6 1")
+        for name, walls in table.bins.items():
+            _add_bin(assets, world, name, walls)
     for name, body in bodies.items():
         T = body.T_frame_body.copy() if poses is None else poses[name]
         if table is not None and poses is None:
@@ -104,6 +111,19 @@ def _model(
     up = -gravity if np.any(gravity) else np.array([0.0, 0.0, 1.0])
     ET.SubElement(world, "light", pos=spell(2 * up), dir=spell(-up), directional="true")
     return model, assets, world
+
+
+def _add_bin(
+    assets: ET.Element, world: ET.Element, name: str, walls: Sequence[NDArray[np.float64]]
+) -> None:
+    """It stands where it is. MuJoCo makes the hulls of its walls' corners."""
+    place = ET.SubElement(world, "body", name=name)
+    for number, wall in enumerate(walls):
+        own = f"{name}_wall_{number}"
+        ET.SubElement(assets, "mesh", name=own, vertex=spell(wall.ravel()))
+        ET.SubElement(
+            place, "geom", name=own, type="mesh", mesh=own, rgba=spell([*BIN_COLOUR, 1.0])
+        )
 
 
 def _add_body(

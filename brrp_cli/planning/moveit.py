@@ -24,14 +24,14 @@ rosidl_runtime_py.set_message_fields takes; `operation` is by default ADD.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from brrp_cli.planning.body import Body
-from brrp_cli.planning.mjcf import Table
+from brrp_cli.planning.mjcf import BIN_COLOUR, Table
 from brrp_cli.planning.numbers import quaternion_wxyz, spell
 
 if TYPE_CHECKING:
@@ -47,8 +47,8 @@ Subframes = Mapping[str, Sequence[tuple[str, Array]]]
 
 
 def scene_text(bodies: Mapping[str, Body], table: Table | None, subframes: Subframes) -> str:
-    """A `.scene` file, metres, frame of the results: each body as its convex parts, the table as a
-    box.
+    """A `.scene` file, metres, frame of the results: each body and each bin as its convex parts,
+    the table as a box.
 
     subframes : of bodies, by name
     """
@@ -57,19 +57,26 @@ def scene_text(bodies: Mapping[str, Body], table: Table | None, subframes: Subfr
         size = ["box", spell(table.size)]
         shape = [*size, *_pose_lines(np.eye(4)), spell(TABLE_COLOUR)]
         lines += [f"* {TABLE}", *_pose_lines(table.T_frame_table), "1", *shape, "0"]
+    for name, walls in _bins(table):
+        lines += [*_part_lines(name, np.eye(4), BIN_COLOUR, walls), "0"]
     for name, body in bodies.items():
-        lines += [f"* {name}", *_pose_lines(body.T_frame_body), str(len(body.parts))]
-        for part in body.parts:
-            hull = _hull(part)
-            lines += ["mesh", f"{len(hull.vertices)} {len(hull.faces)}"]
-            lines += [spell(vertex) for vertex in hull.vertices]
-            lines += [f"{a} {b} {c}" for a, b, c in hull.faces]
-            lines += [*_pose_lines(np.eye(4)), spell([*body.colour, 1.0])]
+        lines += _part_lines(name, body.T_frame_body, body.colour, body.parts)
         frames = _in_body(body, subframes.get(name, ()))
         lines.append(str(len(frames)))
         for frame, T in frames:
             lines += [frame, *_pose_lines(T)]
     return "\n".join([*lines, "."]) + "\n"
+
+
+def _part_lines(name: str, T: Array, colour: Iterable[float], parts: Sequence[Array]) -> list[str]:
+    lines = [f"* {name}", *_pose_lines(T), str(len(parts))]
+    for part in parts:
+        hull = _hull(part)
+        lines += ["mesh", f"{len(hull.vertices)} {len(hull.faces)}"]
+        lines += [spell(vertex) for vertex in hull.vertices]
+        lines += [f"{a} {b} {c}" for a, b, c in hull.faces]
+        lines += [*_pose_lines(np.eye(4)), spell([*colour, 1.0])]
+    return lines
 
 
 def planning_scene(
@@ -87,13 +94,15 @@ def planning_scene(
             }
         )
         colours[TABLE] = TABLE_COLOUR
+    for name, walls in _bins(table):
+        objects.append(_object(name, np.eye(4), frame_id) | _meshes(walls))
+        colours[name] = (*BIN_COLOUR, 1.0)
     for name, body in bodies.items():
         frames = _in_body(body, subframes.get(name, ()))
         objects.append(
             _object(name, body.T_frame_body, frame_id)
+            | _meshes(body.parts)
             | {
-                "meshes": [_mesh(_hull(part)) for part in body.parts],
-                "mesh_poses": [pose(np.eye(4)) for _ in body.parts],
                 "subframe_names": [frame for frame, _ in frames],
                 "subframe_poses": [pose(T) for _, T in frames],
             }
@@ -123,6 +132,17 @@ def pose(T: Array) -> dict[str, Any]:
 
 def _object(name: str, T: Array, frame_id: str) -> dict[str, Any]:
     return {"header": {"frame_id": frame_id}, "id": name, "pose": pose(T)}
+
+
+def _bins(table: Table | None) -> Iterable[tuple[str, Sequence[Array]]]:
+    return () if table is None else table.bins.items()
+
+
+def _meshes(parts: Sequence[Array]) -> dict[str, Any]:
+    return {
+        "meshes": [_mesh(_hull(part)) for part in parts],
+        "mesh_poses": [pose(np.eye(4)) for _ in parts],
+    }
 
 
 def _mesh(hull: trimesh.Trimesh) -> dict[str, Any]:

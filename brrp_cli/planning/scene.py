@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -19,6 +19,7 @@ from brrp_cli.planning.mjcf import Table
 from brrp_cli.planning.options import PlanOptions
 from brrp_cli.planning.parts import convex_parts
 from brrp_cli.results.read import StoredResult
+from brrp_cli.segmentation.bin_walls import Wall, bin_walls, segmentation_of
 from brrp_cli.surface.confidence import ConfidenceSurface, confidence_surface
 
 if TYPE_CHECKING:
@@ -82,18 +83,40 @@ def upwards(stored: StoredResult) -> NDArray[np.float64]:
     return stored.T_frame_cam[:3, :3] @ IMAGE_UP if plane is None else plane.normal
 
 
-def table_under(bodies: list[Body], plane: Plane | None) -> Table | None:
-    """A table whose top is the plane, under all bodies; None without a plane."""
+def table_under(
+    bodies: list[Body], plane: Plane | None, bins: Sequence[Sequence[Wall]] = ()
+) -> Table | None:
+    """A table whose top is the plane, under all bodies; None without a plane.
+
+    bins : the walls of each that stands on it, frame of the results
+    """
     if plane is None or not bodies:
         return None
     axes = body_axes(plane.normal, bodies[0].T_frame_body[:3, 0])
-    corners = np.vstack([transform_points(b.T_frame_body, np.vstack(b.parts)) for b in bodies])
+    corners = np.vstack(
+        [
+            *(transform_points(b.T_frame_body, np.vstack(b.parts)) for b in bodies),
+            *(wall for walls in bins for wall in walls),
+        ]
+    )
     local = corners @ axes
     low, high = local.min(axis=0) - TABLE_MARGIN, local.max(axis=0) + TABLE_MARGIN
     middle = (low + high) / 2
     middle[2] = -plane.offset - TABLE_THICKNESS / 2
     size = np.array([*(high - low)[:2], TABLE_THICKNESS])
-    return Table(similarity(1.0, axes, axes @ middle), size)
+    named = {f"bin_{number}": walls for number, walls in enumerate(bins, start=1)}
+    return Table(similarity(1.0, axes, axes @ middle), size, named)
+
+
+def bins_around(stored: StoredResult) -> list[list[Wall]]:
+    """The walls of the bins on the table, frame of the results."""
+    if stored.plane is None:
+        return []
+    config = segmentation_of(stored.record["segmentation"])
+    return [
+        [np.asarray(transform_points(stored.T_frame_cam, wall)) for wall in walls]
+        for walls in bin_walls(stored.frame, stored.record["seed"], config)
+    ]
 
 
 def _region(

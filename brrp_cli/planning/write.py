@@ -16,12 +16,18 @@ from brrp_cli.errors import ResultError
 from brrp_cli.files import atomic_folder
 from brrp_cli.planning.body import Body
 from brrp_cli.planning.curobo import curobo_world
-from brrp_cli.planning.mjcf import Files, Table, body_mjcf, scene_mjcf
+from brrp_cli.planning.mjcf import BIN_COLOUR, Files, Table, body_mjcf, scene_mjcf
 from brrp_cli.planning.moveit import planning_scene, scene_text
 from brrp_cli.planning.moveit_grasps import grasp_frames, grasp_messages, stored_grasps
 from brrp_cli.planning.options import PlanOptions
 from brrp_cli.planning.rest import Rest, put_to_rest
-from brrp_cli.planning.scene import PlannedObject, planned_objects, table_under, upwards
+from brrp_cli.planning.scene import (
+    PlannedObject,
+    bins_around,
+    planned_objects,
+    table_under,
+    upwards,
+)
 from brrp_cli.planning.urdf import urdf
 from brrp_cli.raycast import raycasting_scene
 from brrp_cli.results.read import StoredResult
@@ -61,7 +67,7 @@ def write_plan(
     with atomic_folder(folder, overwrite=overwrite, mark=RECORD) as partial:
         objects = list(planned_objects(stored, options) if planned is None else planned)
         bodies = {each.body.name: each.body for each in objects}
-        table = table_under(list(bodies.values()), stored.plane)
+        table = table_under(list(bodies.values()), stored.plane, bins_around(stored))
         config, resting = RestConfig(), {}
         if options.rests and table is not None:
             resting = put_to_rest(bodies, table, config)
@@ -140,6 +146,11 @@ def _glb(bodies: dict[str, Body], table: Table | None) -> trimesh.Scene:
         top = trimesh.creation.box(table.size, table.T_frame_table)
         top.visual.face_colors = TABLE_COLOUR
         scene.add_geometry(top, node_name="table", geom_name="table")
+        for name, walls in table.bins.items():
+            for i, wall in enumerate(walls):
+                hull = trimesh.convex.convex_hull(wall)
+                hull.visual.face_colors = [*(round(255 * c) for c in BIN_COLOUR), 255]
+                scene.add_geometry(hull, node_name=f"{name}_wall_{i}", geom_name=f"{name}_wall_{i}")
     return scene
 
 
@@ -168,7 +179,14 @@ def _record(
         "up": upwards(stored).tolist(),
         "table": None
         if table is None
-        else {"T_frame_table": table.T_frame_table.tolist(), "size": table.size.tolist()},
+        else {
+            "T_frame_table": table.T_frame_table.tolist(),
+            "size": table.size.tolist(),
+            "bins": [
+                {"name": name, "walls": [wall.tolist() for wall in walls]}
+                for name, walls in table.bins.items()
+            ],
+        },
         "objects": [
             _object_record(each, files[each.body.name], resting.get(each.body.name))
             for each in objects

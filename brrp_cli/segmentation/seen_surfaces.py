@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,10 +12,10 @@ from brrp_cli.errors import FrameError
 from brrp_cli.frames.frame import Frame
 from brrp_cli.frames.last_frame import kept_for_last_image
 from brrp_cli.geometry import backproject
-from brrp_cli.segmentation.bins import find_bins
 from brrp_cli.segmentation.concave_edges import depth_jumps, hollow_angles, surface_normals
+from brrp_cli.segmentation.seen_table import see_table
 from brrp_cli.segmentation.smooth_depth import flying_pixels, smooth_depth
-from brrp_cli.segmentation.table_plane import Table, find_table
+from brrp_cli.segmentation.table_plane import Table
 
 Array = NDArray[np.floating]
 
@@ -61,20 +61,16 @@ def see_surfaces(frame: Frame, seed: int, config: SegmentConfig) -> SeenSurfaces
             f" {int(valid.sum())} of them agree with their neighbours",
             fix="check the depth image and its unit; masks made elsewhere go in by --masks",
         )
-    table = find_table(points[valid], seed, frame.source, config.table)
-    plan, height = table.plan(points), table.plane.signed_distance(points)
-    beside = table.beside(plan)
-    near = beside <= config.bins.beside
-    table = replace(table, bins=find_bins(plan[near], height[near], config.bins))
+    found = see_table(points, seed, frame.source, config)
     normals = surface_normals(points, config.concave_edges)
     return SeenSurfaces(
         depth,
         points,
         valid,
-        table,
-        table.above_floors(plan, height),
-        plan,
-        beside,
+        found.table,
+        found.height,
+        found.plan,
+        found.beside,
         normals,
         hollow_angles(points, normals, config.concave_edges),
         depth_jumps(depth, frame.K, config.concave_edges),

@@ -8,6 +8,7 @@ import numpy as np
 from table_scene import T_CAM_WORLD, TABLE, in_camera, photograph
 
 from brrp_cli.config.grasping import SurroundingsConfig
+from brrp_cli.config.segmentation import SmoothDepthConfig
 from brrp_cli.grasping.standing_around import standing_around
 from brrp_cli.shapes import solids
 
@@ -20,7 +21,7 @@ def around(*others, plane=TABLE):
     meshes = {number: in_camera(other, T_CAM_WORLD) for number, other in enumerate(others, 7)}
     seen = photograph({1: BOX, **meshes})
     seen = replace(seen, segmap=np.where(seen.segmap > 1, 0, seen.segmap))
-    return standing_around(seen, plane, seen.object_points(1), CONFIG)
+    return standing_around(seen, plane, seen.object_points(1), CONFIG, SmoothDepthConfig())
 
 
 def test_a_wall_beside_an_object_is_found_where_it_is():

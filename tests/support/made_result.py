@@ -26,7 +26,7 @@ from brrp_cli.results.write import write_results
 from brrp_cli.shapes import solids
 from brrp_cli.surface.extract import extract_surface
 
-BOX, ELL, SPECK = 7, -3, 40
+BOX, ELL, SPECK, UNMASKED = 7, -3, 40, 50
 WIDTH = 0.002  # metres: a surface's place is logistic with this scale
 SPACING, MARGIN = 0.003, 0.03
 
@@ -89,11 +89,16 @@ def _retrieved(name: str, probability: float, size: float, **scores: float) -> R
     return Retrieved(name, probability, T, T_cam_mesh=T, size_factor=size, **scores)
 
 
-def write_made_result(folder: Path, *, frame: str = "camera") -> Path:
-    """The box, the L, and a speck of four pixels without a mesh."""
+def write_made_result(
+    folder: Path, *, frame: str = "camera", unmasked: trimesh.Trimesh | None = None
+) -> Path:
+    """The box, the L, and a speck of four pixels without a mesh.
+
+    unmasked : what has no mask, camera frame
+    """
     meshes = truth()
-    seen = photograph(meshes)
-    segmap = seen.segmap.copy()
+    seen = photograph(meshes if unmasked is None else meshes | {UNMASKED: unmasked})
+    segmap = np.where(seen.segmap == UNMASKED, 0, seen.segmap)
     segmap[-2:, :2] = SPECK
     seen = replace(seen, segmap=segmap)
     config = preset("default")

@@ -1,0 +1,42 @@
+"""The table that a frame shows, with the bins on it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brrp_cli.config.segmentation import SegmentConfig
+from brrp_cli.segmentation.bins import find_bins
+from brrp_cli.segmentation.table_plane import Table, find_table
+
+
+@dataclass(frozen=True)
+class SeenTable:
+    """A table, and where points lie over it; NaN where there is no depth.
+
+    plan : (H, W, 2) metres, on it; height : (H, W) metres above it or a floor of a bin; beside :
+    (H, W) metres beside it, 0 or less on it
+    """
+
+    table: Table
+    plan: NDArray[np.float64]
+    height: NDArray[np.float64]
+    beside: NDArray[np.float64]
+
+
+def see_table(
+    points: NDArray[np.floating], seed: int, source: object, config: SegmentConfig
+) -> SeenTable:
+    """The table of points (H, W, 3), metres, camera frame, NaN = none.
+
+    source : for messages. Errors: FrameError if there is no table.
+    """
+    valid = np.isfinite(points[..., 2])
+    table = find_table(points[valid], seed, source, config.table)
+    plan, height = table.plan(points), table.plane.signed_distance(points)
+    beside = table.beside(plan)
+    near = beside <= config.bins.beside
+    table = replace(table, bins=find_bins(plan[near], height[near], config.bins))
+    return SeenTable(table, plan, table.above_floors(plan, height), beside)
