@@ -15,7 +15,7 @@ from brrp_cli.errors import SceneError
 from brrp_cli.files import atomic_folder
 from brrp_cli.frames.published import depth_from_buffer, intrinsics_from_projection
 from brrp_cli.seeds import child_rng
-from tabletop.bin import Bin, draw_bin
+from tabletop.bin import Bin, draw_bin, write_panels
 from tabletop.camera import FAR, NEAR, Camera, Standpoint, draw_camera
 from tabletop.check import (
     CLEAN,
@@ -104,6 +104,8 @@ def make_scene(plan: Plan, number: int, check: bool) -> list[Distance]:
             for i, (path, pose) in enumerate(zip(paths, poses, strict=True))
         ]
         (partial / "objects.json").write_text(json.dumps(entries, indent=2) + "\n")
+        if bin is not None:
+            write_panels(bin.panels(), partial)
         for i, (camera, picture) in enumerate(zip(cameras, pictures, strict=True)):
             depth = picture.depth
             if plan.noise != "none":
