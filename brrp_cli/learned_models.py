@@ -24,18 +24,31 @@ TYPES: dict[str, type[np.generic]] = {
 
 class OnnxModel:
     """A model on the CPU. what : its name in messages; kind : class of the errors; fix : what to do
-    about a file that cannot be read, or fails when it is run."""
+    about a file that cannot be read, or fails when it is run; threads : of one run, None: all"""
 
-    def __init__(self, path: Path, what: str, kind: type[BrrpError], fix: str) -> None:
+    def __init__(
+        self,
+        path: Path,
+        what: str,
+        kind: type[BrrpError],
+        fix: str,
+        threads: int | None = None,
+    ) -> None:
         self.path, self.what, self._kind, self._fix = path, what, kind, fix
-        self._session = self._open()
+        self._session = self._open(threads)
         self.inputs = {one.name: one for one in self._session.get_inputs()}
         self.outputs: list[str] = [one.name for one in self._session.get_outputs()]
 
-    def _open(self) -> Any:
+    @property
+    def metadata(self) -> dict[str, str]:
+        """What the file says of itself."""
+        return dict(self._session.get_modelmeta().custom_metadata_map)
+
+    def _open(self, threads: int | None) -> Any:
         runtime = import_library("onnxruntime")
         options = runtime.SessionOptions()
         options.log_severity_level = 4  # its chatter on stderr is not for users; errors are raised
+        options.intra_op_num_threads = threads or 0
         levels = runtime.GraphOptimizationLevel
         # Optimising trips over the casts of the 4-bit detector; unoptimised it is right, and slow.
         for level in (levels.ORT_ENABLE_ALL, levels.ORT_DISABLE_ALL):

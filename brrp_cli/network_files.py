@@ -7,7 +7,7 @@ The metadata has `format`, `network` (JSON of its config, a dataclass) and `trai
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import asdict
 from pathlib import Path
@@ -48,7 +48,7 @@ def load_network(path: Path, kind: str, what: str, build: Callable[[dict[str, An
     import torch
 
     with _told(path, kind, what):
-        metadata, tensors = _read(path, [kind])
+        metadata, tensors = _read(path, kind)
         # Without numbers of its own: none are drawn from torch's random state.
         with torch.device("meta"):
             network = build(json.loads(metadata["network"]))
@@ -56,21 +56,14 @@ def load_network(path: Path, kind: str, what: str, build: Callable[[dict[str, An
     return network.eval().requires_grad_(False)
 
 
-def load_weights(path: Path, kinds: Sequence[str], what: str) -> dict[str, Tensor]:
-    """The weights of a file of one of several kinds, by name, without their network; else as
-    `load_network`."""
-    with _told(path, " or ".join(kinds), what):
-        return _read(path, kinds)[1]
-
-
-def _read(path: Path, kinds: Sequence[str]) -> tuple[dict[str, str], dict[str, Tensor]]:
+def _read(path: Path, kind: str) -> tuple[dict[str, str], dict[str, Tensor]]:
     """Metadata and weights."""
     import torch
 
     with import_library("safetensors").safe_open(path, framework="pt") as file:
         metadata = file.metadata() or {}
         tensors = {name: file.get_tensor(name).to(torch.float32) for name in file.keys()}  # noqa: SIM118
-    if metadata.get("format") not in kinds:
+    if metadata.get("format") != kind:
         raise ValueError(f"its format is {metadata.get('format')}")
     return metadata, tensors
 

@@ -9,7 +9,7 @@ colour and geometry with true labels, in OUTPUT/examples. Then the network is tr
 start or, with `--begin`, from the weights of an earlier training. The same command goes on where
 it was stopped or killed; more --epochs lengthen a training that is over.
 
-Some scenes are kept to validate. OUTPUT/affinities.safetensors has the weights of the epoch with
+Some scenes are kept to validate. OUTPUT/affinities.onnx has the weights of the epoch with
 the least loss on them; copied to brrp_cli/segmentation/, it is what the package parts objects
 with. history.json has the losses of each epoch.
 """
@@ -33,7 +33,7 @@ from training.watched import late_after, run_watched
 from brrp_cli.errors import BrrpError
 from brrp_cli.files import sha256_file
 from brrp_cli.ground_truth.scenes import find_scenes
-from brrp_cli.segmentation.learned_affinities import NAME, save_affinity_network
+from brrp_cli.segmentation.learned_affinities import NAME
 
 MEASURED = "measured"
 SETS = f"SCENES or SCENES:{MEASURED}"
@@ -65,7 +65,7 @@ SETS = f"SCENES or SCENES:{MEASURED}"
 @click.option(
     "--begin",
     type=click.Path(path_type=Path, exists=True, dir_okay=False),
-    help="As the network of this affinities.safetensors.",
+    help="As the network of this affinities.onnx.",
 )
 @click.option("--seed", default=0, show_default=True)
 @click.option("--workers", default=2, show_default=True, type=click.IntRange(1))
@@ -88,10 +88,10 @@ def main(
     examples_only: bool,
 ) -> None:
     """Train on SETS, SCENES or SCENES:measured, or on the examples that are in OUTPUT already."""
+    from training.affinity_file import save_affinity_network
+    from training.affinity_network import AffinityNetworkConfig
     from training.mask_examples import Wanted, is_held, make_all, read_examples
     from training.masks import Training, TrainingConfig, resumed, started
-
-    from brrp_cli.segmentation.affinity_network import AffinityNetworkConfig
 
     late = late_after(minutes)
     try:

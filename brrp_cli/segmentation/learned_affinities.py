@@ -1,7 +1,6 @@
 """Affinities of pixels, by the network that comes with the package.
 
-`tools/train_masks.py` trains it and says on what; brrp_cli/segmentation/affinities.safetensors
-holds it (network_files.py).
+`tools/train_masks.py` trains it and says on what; brrp_cli/segmentation/affinities.onnx holds it.
 """
 
 from __future__ import annotations
@@ -10,15 +9,16 @@ from dataclasses import dataclass
 from functools import cache
 from importlib.resources import as_file, files
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from brrp_cli.config.segmentation import SegmentConfig
+from brrp_cli.errors import WeightsError
 from brrp_cli.frames.frame import Frame
 from brrp_cli.frames.last_frame import kept_for_last_image
-from brrp_cli.network_files import load_network, save_network
+from brrp_cli.learned_models import OnnxModel
 from brrp_cli.segmentation.image_channels import (
     COLOURS,
     WHOLE,
@@ -26,23 +26,44 @@ from brrp_cli.segmentation.image_channels import (
     resized,
     size_of,
 )
-from brrp_cli.segmentation.pixel_pairs import box_of
+from brrp_cli.segmentation.pixel_pairs import OFFSETS, box_of
 from brrp_cli.segmentation.rising import rising_in
 from brrp_cli.segmentation.seen_surfaces import SeenSurfaces
 from brrp_cli.threads import cores, in_threads
 
-if TYPE_CHECKING:
-    from torch import Tensor
-
-    from brrp_cli.segmentation.affinity_network import AffinityNetwork
-
 T = TypeVar("T", bound=np.generic)
 
-# Of networks that saw the image at full size, and before, at half of it alone.
-FORMATS = "brrp affinities 2", "brrp affinities 1"
-FORMAT = FORMATS[0]
+# In the file's metadata, beside `network` and `training`, which are JSON.
+FORMAT = "brrp affinities 3"
 WHAT = "the network that parts objects"
-NAME = "affinities.safetensors"
+NAME = "affinities.onnx"
+CHANNELS_IN, PROBABILITIES_OUT = "channels", "probabilities"
+
+
+class AffinityModel:
+    """The network of a file, which threads may ask at the same time.
+
+    Errors: WeightsError if the file is missing, damaged or of another kind.
+    """
+
+    def __init__(self, path: Path) -> None:
+        # A thread for each question: more would change the last bits.
+        self._model = OnnxModel(path, WHAT, WeightsError, "install brrp-cli again", threads=1)
+        found = self._model.metadata.get("format")
+        if found != FORMAT:
+            raise WeightsError(
+                f"{WHAT[0].upper()}{WHAT[1:]} cannot be read",
+                where=path,
+                expected=FORMAT,
+                found=found,
+                fix="install brrp-cli again",
+            )
+
+    def __call__(self, channels: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Probabilities (len(OFFSETS) + 1, h, w) from channels (CHANNELS, h, w): affinities, and at
+        last that the pixel shows an object."""
+        (found,) = self._model.run([PROBABILITIES_OUT], {CHANNELS_IN: channels[None]})
+        return np.asarray(found[0])
 
 
 @dataclass(frozen=True)
@@ -79,7 +100,7 @@ def affinities_in(frame: Frame, seen: SeenSurfaces, config: SegmentConfig) -> Af
 def affinities_of(
     rgb: NDArray[np.uint8],
     seen: SeenSurfaces,
-    network: AffinityNetwork,
+    network: AffinityModel,
     colour: float = 1.0,
     asked: NDArray[np.bool_] | None = None,
     margin: int = 0,
@@ -90,46 +111,25 @@ def affinities_of(
     asked : (H, W) of the box around these pixels, and of `margin` pixels of its own image
         beyond it; 0 elsewhere. None = of the whole image
     """
-    import torch
-
-    from brrp_cli.segmentation.affinity_network import OFFSETS
-
     size = size_of(rgb.shape[:2])
     box = WHOLE if asked is None else box_of(resized(asked, size), margin)
-    values = torch.from_numpy(image_channels(rgb, seen, box)).float() / 63
-    blind = values.clone()
+    values = image_channels(rgb, seen, box).astype(np.float32) / np.float32(63)
+    blind = values.copy()
     blind[COLOURS] = 0
     looks = [(look, w) for look, w in ((values, colour), (blind, 1 - colour)) if w > 0]
 
-    def say(look: tuple[Tensor, float]) -> Tensor:
-        with torch.no_grad():
-            return look[1] * torch.sigmoid(network(look[0][None])[0])
+    def say(look: tuple[NDArray[np.float32], float]) -> NDArray[np.float32]:
+        return np.float32(look[1]) * network(look[0])
 
-    # A thread for each: torch's own would change the last bits.
     found = np.zeros((len(OFFSETS) + 1, *size), np.float32)
-    if values.numel():
+    if values.size:
         for said in in_threads(say, looks, cores()):
-            found[:, *box] += said.numpy()
+            found[:, *box] += said
     return Affinities(found[:-1], found[-1], OFFSETS, (rgb.shape[0], rgb.shape[1]))
 
 
-def save_affinity_network(network: AffinityNetwork, training: dict[str, Any], path: Path) -> None:
-    """Write the file, whole or not at all. Errors: OutputError."""
-    save_network(network, network.config, FORMAT, training, path)
-
-
-def load_affinity_network(path: Path) -> AffinityNetwork:
-    """The network of a file. Errors: WeightsError if it is missing, damaged or of another kind."""
-    from brrp_cli.segmentation.affinity_network import AffinityNetwork, AffinityNetworkConfig
-
-    def build(config: dict[str, Any]) -> AffinityNetwork:
-        return AffinityNetwork(AffinityNetworkConfig(tuple(config["widths"])))
-
-    return load_network(path, FORMAT, WHAT, build)
-
-
 @cache
-def shipped() -> AffinityNetwork:
+def shipped() -> AffinityModel:
     """The network that comes with the package."""
     with as_file(files("brrp_cli.segmentation") / NAME) as path:
-        return load_affinity_network(path)
+        return AffinityModel(path)

@@ -1,9 +1,18 @@
-"""Pixels of an image, their partners at an offset, and the box around some of them."""
+"""Pixels of an image, their partners at an offset, and the box around some of them.
+
+Near partners tell borders, far ones what belongs together beyond a border that prints, shadows or
+waves of depth have drawn (Wolf et al., "The Mutex Watershed", ECCV 2018).
+"""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
+
+# Rows and columns from a pixel to its partner, in pixels of the network's image.
+REACHES = (2, 6, 14, 32)
+DIRECTIONS = ((0, 1), (1, 0), (1, 1), (1, -1))
+OFFSETS = tuple((reach * down, reach * right) for reach in REACHES for down, right in DIRECTIONS)
 
 
 def windows(

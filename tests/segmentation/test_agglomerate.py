@@ -3,10 +3,9 @@
 import numpy as np
 import pytest
 
-from brrp_cli.segmentation.affinity_network import OFFSETS
 from brrp_cli.segmentation.agglomerate import borders_of, join_alike_pixels
 from brrp_cli.segmentation.learned_affinities import Affinities
-from brrp_cli.segmentation.pixel_pairs import box_of, windows
+from brrp_cli.segmentation.pixel_pairs import OFFSETS, box_of, windows
 
 SHAPE = (40, 60)
 

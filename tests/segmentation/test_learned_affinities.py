@@ -1,52 +1,89 @@
 """The network that parts objects: its file, and what it says of images of any size."""
 
+from concurrent.futures import ThreadPoolExecutor
+
 import numpy as np
+import onnx
 import pytest
 import torch
-from safetensors.torch import save_file
+from training.affinity_file import load_weights, save_affinity_network
+from training.affinity_network import AffinityNetwork, AffinityNetworkConfig
 
 from brrp_cli.config.segmentation import SegmentConfig
 from brrp_cli.errors import WeightsError
 from brrp_cli.frames.build import make_frame
-from brrp_cli.segmentation.affinity_network import AffinityNetwork, AffinityNetworkConfig
+from brrp_cli.segmentation.image_channels import CHANNELS
 from brrp_cli.segmentation.learned_affinities import (
     Affinities,
+    AffinityModel,
     affinities_of,
-    load_affinity_network,
-    save_affinity_network,
     shipped,
 )
-from brrp_cli.segmentation.pixel_pairs import windows
+from brrp_cli.segmentation.pixel_pairs import OFFSETS, windows
 from brrp_cli.segmentation.seen_surfaces import see_surfaces
 
 
-def tiny():
+@pytest.fixture(scope="module")
+def place(tmp_path_factory):
+    """A small network, and its file."""
     torch.manual_seed(0)
-    return AffinityNetwork(AffinityNetworkConfig((4, 4, 4, 8, 8, 8))).eval()
-
-
-def test_a_file_gives_the_network_back(tmp_path, scene):
-    frame = make_frame(rgb=scene.rgb, depth=scene.depth, K=scene.K)
-    seen = see_surfaces(frame, 0, SegmentConfig())
-    network, path = tiny(), tmp_path / "affinities.safetensors"
+    network = AffinityNetwork(AffinityNetworkConfig((4, 4, 4, 8, 8, 8))).eval()
+    with torch.no_grad():
+        # No two are equal, as after training: the exporter keeps one of those that are.
+        for each in network.parameters():
+            each += 0.05 * torch.randn_like(each)
+    path = tmp_path_factory.mktemp("network") / "affinities.onnx"
     save_affinity_network(network, {"views": 1}, path)
-    before = affinities_of(frame.rgb, seen, network)
-    after = affinities_of(frame.rgb, seen, load_affinity_network(path))
-    np.testing.assert_allclose(before.same, after.same, atol=0.01)
-    assert before.restore(before.object).shape == frame.shape
-    assert ((before.same > 0) & (before.same < 1)).all()
+    return network, path
 
 
-@pytest.mark.parametrize("bad", ["nothing", "no weights", "another format"])
-def test_a_file_that_cannot_be_used_is_named(tmp_path, bad):
-    path = tmp_path / "affinities.safetensors"
-    if bad == "no weights":
+@pytest.fixture(scope="module")
+def tiny(place):
+    return AffinityModel(place[1])
+
+
+@pytest.mark.parametrize("size", [(64, 96), (75, 133), (20, 24)])
+def test_a_file_says_what_the_network_says(place, tiny, size):
+    channels = np.random.default_rng(0).normal(0, 1, (CHANNELS, *size)).astype(np.float32)
+    with torch.no_grad():
+        said = torch.sigmoid(place[0](torch.from_numpy(channels)[None]))[0].numpy()
+    found = tiny(channels)
+    assert found.shape == (len(OFFSETS) + 1, *size)
+    # Weights are stored in half precision.
+    np.testing.assert_allclose(found, said, atol=0.01)
+    assert np.ptp(said) > 0.05
+
+
+def test_a_training_begins_with_the_weights_of_a_file(place):
+    network, path = place
+    weights = load_weights(path)
+    own = network.state_dict()
+    assert weights.keys() == own.keys()
+    for name, tensor in weights.items():
+        np.testing.assert_array_equal(tensor, own[name].half().float())
+
+
+@pytest.mark.parametrize("bad", ["nothing", "no model", "another format"])
+@pytest.mark.parametrize("read", [AffinityModel, load_weights])
+def test_a_file_that_cannot_be_used_is_named(place, tmp_path, bad, read):
+    path = tmp_path / "affinities.onnx"
+    if bad == "no model":
         path.write_bytes(b"\x00" * 100)
     elif bad == "another format":
-        save_file({"x": torch.zeros(2)}, path, metadata={"format": "brrp completion 1"})
+        model = onnx.load(place[1])
+        onnx.helper.set_model_props(model, {"format": "brrp affinities 0"})
+        onnx.save(model, path)
     with pytest.raises(WeightsError, match="network that parts objects cannot be read") as raised:
-        load_affinity_network(path)
+        read(path)
     assert str(path) in str(raised.value)
+
+
+def test_threads_that_ask_at_once_get_what_one_gets(tiny):
+    rng = np.random.default_rng(1)
+    asked = [rng.normal(0, 1, (CHANNELS, 64, 96)).astype(np.float32) for _ in range(8)]
+    alone = [tiny(each).tobytes() for each in asked]
+    with ThreadPoolExecutor(4) as pool:
+        assert [each.tobytes() for each in pool.map(tiny, asked)] == alone
 
 
 def test_the_networks_image_and_that_of_the_camera_lie_on_each_other():
@@ -58,13 +95,13 @@ def test_the_networks_image_and_that_of_the_camera_lie_on_each_other():
     assert np.array_equal(affinities.sample(large), few)
 
 
-def test_the_network_sees_the_box_that_is_asked_for_and_nothing_else(scene):
+def test_the_network_sees_the_box_that_is_asked_for_and_nothing_else(scene, tiny):
     seen = see_surfaces(make_frame(depth=scene.depth, K=scene.K), 0, SegmentConfig())
     asked = np.zeros(scene.depth.shape, bool)
-    none = affinities_of(scene.rgb, seen, tiny(), asked=asked, margin=4)
+    none = affinities_of(scene.rgb, seen, tiny, asked=asked, margin=4)
     assert not none.object.any() and not none.same.any()
     asked[40:60, 50:90] = True  # the network's image is twice as large
-    found = affinities_of(scene.rgb, seen, tiny(), asked=asked, margin=4)
+    found = affinities_of(scene.rgb, seen, tiny, asked=asked, margin=4)
     box = np.zeros(found.object.shape, bool)
     box[76:124, 96:184] = True
     assert np.array_equal(found.object > 0, box)

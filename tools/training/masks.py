@@ -1,4 +1,4 @@
-"""Training of the network that parts objects (brrp_cli/segmentation/affinity_network.py)."""
+"""Training of the network that parts objects (affinity_network.py)."""
 
 from __future__ import annotations
 
@@ -12,15 +12,10 @@ from torch import Tensor
 from torch.nn.functional import binary_cross_entropy_with_logits as cross_entropy
 
 from brrp_cli.files import atomic_path
-from brrp_cli.network_files import load_weights
 from brrp_cli.seeds import child_seed
-from brrp_cli.segmentation.affinity_network import (
-    OFFSETS,
-    AffinityNetwork,
-    AffinityNetworkConfig,
-)
-from brrp_cli.segmentation.learned_affinities import FORMATS, WHAT
-from brrp_cli.segmentation.pixel_pairs import windows
+from brrp_cli.segmentation.pixel_pairs import OFFSETS, windows
+from training.affinity_file import load_weights
+from training.affinity_network import AffinityNetwork, AffinityNetworkConfig
 from training.epochs import EpochsConfig, EpochTraining
 from training.mask_batches import Batch, draw_batch
 from training.mask_examples import Examples
@@ -59,15 +54,11 @@ def started(config: AffinityNetworkConfig, seed: int) -> AffinityNetwork:
 
 def resumed(path: Path, seed: int) -> AffinityNetwork:
     """A network to train on: what it has in common with that of a file that `tools/train_masks.py`
-    wrote, of this or of an earlier kind, is as it is there. Errors: WeightsError."""
+    wrote, also one of other layers, is as it is there. Errors: WeightsError."""
     network = started(AffinityNetworkConfig(), seed)
-    tensors = load_weights(path, FORMATS, WHAT)
     own = network.state_dict()
-    same = {n: t for n, t in tensors.items() if n in own and own[n].shape == t.shape}
+    same = {n: t for n, t in load_weights(path).items() if n in own and own[n].shape == t.shape}
     network.load_state_dict(same, strict=False)
-    # What looks at the image for the first time says nothing of it to those that have learned.
-    if "first_down.weight" not in same:
-        torch.nn.init.zeros_(network.first_down.weight)
     return network
 
 

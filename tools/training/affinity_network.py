@@ -1,8 +1,7 @@
 """A network that says of two pixels near each other whether they show one object: a small U-Net.
 
-It gives an affinity for each pixel and the one that lies `OFFSETS` from it, near and far (Wolf et
-al., "The Mutex Watershed", ECCV 2018): near ones are borders, far ones say what belongs together
-beyond a border that prints, shadows or waves of depth have drawn.
+It gives an affinity for each pixel and the one that lies `OFFSETS` from it
+(brrp_cli/segmentation/pixel_pairs.py).
 """
 
 from __future__ import annotations
@@ -14,11 +13,8 @@ from torch import Tensor, nn
 from torch.nn.functional import avg_pool2d, interpolate, pad
 
 from brrp_cli.segmentation.image_channels import CHANNELS
+from brrp_cli.segmentation.pixel_pairs import OFFSETS
 
-# Rows and columns from a pixel to its partner, in pixels of the network's image.
-REACHES = (2, 6, 14, 32)
-DIRECTIONS = ((0, 1), (1, 0), (1, 1), (1, -1))
-OFFSETS = tuple((reach * down, reach * right) for reach in REACHES for down, right in DIRECTIONS)
 # A pixel of the coarsest level, in those of the image, which is padded to a multiple of it.
 _MULTIPLE = 32
 
