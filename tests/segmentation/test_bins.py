@@ -4,7 +4,19 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from bin_scene import FLOOR, HEIGHT, LENGTH, T_WORLD_CAM, WIDTH, YAW, seen, standing
+import trimesh
+from bin_scene import (
+    FLOOR,
+    HEIGHT,
+    LENGTH,
+    T_WORLD_CAM,
+    WALL,
+    WIDTH,
+    YAW,
+    bin_mesh,
+    seen,
+    standing,
+)
 
 from brrp_cli.config.segmentation import SegmentConfig
 from brrp_cli.demo.layout import camera_pose, turn
@@ -97,6 +109,31 @@ def test_a_bin_that_the_border_cuts_is_one():
     assert len(surfaces(frame).table.bins) == 1
     found = segment(frame)
     assert found.max() == 1 and found_as(found, frame.segmap == 1) > 0.7
+
+
+@pytest.mark.parametrize("stretched", [(1.0, 1.0), (1.3, 0.9)])
+def test_a_round_basket_and_an_oval_one_are_bins(stretched):
+    outer, hollow = (
+        solids.moved(trimesh.creation.cylinder(radius, 0.12, sections=64), z=0.06 + up)
+        for radius, up in ((0.184, 0.0), (0.18, FLOOR))
+    )
+    basket = solids.difference(outer, hollow).apply_transform(np.diag([*stretched, 1.0, 1.0]))
+    frame = seen(standing((0.08, 0.06, 0.07), 0.05, 0.02), bin=basket)
+    found = segment(frame)
+    assert len(surfaces(frame).table.bins) == 1
+    assert found.max() == 1 and found_as(found, frame.segmap == 1) > 0.9
+
+
+def test_things_in_two_bins_side_by_side_have_masks():
+    beside = WIDTH + 2 * WALL + 0.001
+    both = trimesh.util.concatenate([bin_mesh(), solids.moved(bin_mesh(), y=beside)])
+    things = [standing((0.08, 0.06, 0.07), x, y) for x, y in ((0.05, 0.02), (-0.05, beside))]
+    wide = camera_pose(np.array([0.0, 0.2, 0.03]), 1.15, np.deg2rad(55.0), 0.9)
+    frame = seen(*things, bin=both, T_world_cam=wide)
+    found = segment(frame)
+    # What parts them is a thing.
+    assert found.max() <= 3
+    assert min(found_as(found, frame.segmap == i) for i in (1, 2)) > 0.85
 
 
 def test_bowls_and_heaps_of_boxes_are_no_bins():
