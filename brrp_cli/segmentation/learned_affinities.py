@@ -1,6 +1,6 @@
-"""Affinities of pixels, by the network that comes with the package.
+"""Affinities of pixels, by the networks that come with the package.
 
-`tools/train_masks.py` trains it and says on what; brrp_cli/segmentation/affinities.onnx holds it.
+`tools/train_masks.py` trains them; docs/frames-and-masks.md says on what.
 """
 
 from __future__ import annotations
@@ -36,7 +36,8 @@ T = TypeVar("T", bound=np.generic)
 # In the file's metadata, beside `network` and `training`, which are JSON.
 FORMAT = "brrp affinities 3"
 WHAT = "the network that parts objects"
-NAME = "affinities.onnx"
+# Of tables, and of what lies in a bin, whose walls the former never saw.
+NAME, BIN_NAME = "affinities.onnx", "affinities_bin.onnx"
 CHANNELS_IN, PROBABILITIES_OUT = "channels", "probabilities"
 
 
@@ -91,10 +92,11 @@ class Affinities:
 @kept_for_last_image
 def affinities_in(frame: Frame, seen: SeenSurfaces, config: SegmentConfig) -> Affinities:
     """What the network that comes with the package says of a frame and the surfaces seen in it, of
-    what rises and what is near it."""
+    what rises and what is near it. Where there is a bin, it is the network that knows bins."""
     risen = rising_in(frame, seen, config).risen
     own = config.affinities
-    return affinities_of(frame.rgb, seen, shipped(), own.colour, risen, own.margin)
+    network = shipped(BIN_NAME if seen.table.bins else NAME)
+    return affinities_of(frame.rgb, seen, network, own.colour, risen, own.margin)
 
 
 def affinities_of(
@@ -129,7 +131,7 @@ def affinities_of(
 
 
 @cache
-def shipped() -> AffinityModel:
-    """The network that comes with the package."""
-    with as_file(files("brrp_cli.segmentation") / NAME) as path:
+def shipped(name: str = NAME) -> AffinityModel:
+    """A network that comes with the package, `NAME` or `BIN_NAME`."""
+    with as_file(files("brrp_cli.segmentation") / name) as path:
         return AffinityModel(path)

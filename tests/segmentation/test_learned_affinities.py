@@ -1,6 +1,7 @@
 """The network that parts objects: its file, and what it says of images of any size."""
 
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 
 import numpy as np
 import onnx
@@ -12,14 +13,19 @@ from training.affinity_network import AffinityNetwork, AffinityNetworkConfig
 from brrp_cli.config.segmentation import SegmentConfig
 from brrp_cli.errors import WeightsError
 from brrp_cli.frames.build import make_frame
+from brrp_cli.segmentation.bins import Bin
 from brrp_cli.segmentation.image_channels import CHANNELS
 from brrp_cli.segmentation.learned_affinities import (
+    BIN_NAME,
+    NAME,
     Affinities,
     AffinityModel,
+    affinities_in,
     affinities_of,
     shipped,
 )
 from brrp_cli.segmentation.pixel_pairs import OFFSETS, windows
+from brrp_cli.segmentation.rising import rising_in
 from brrp_cli.segmentation.seen_surfaces import see_surfaces
 
 
@@ -108,10 +114,11 @@ def test_the_network_sees_the_box_that_is_asked_for_and_nothing_else(scene, tiny
     assert (found.same[:, box] > 0).all() and not found.same[:, ~box].any()
 
 
+@pytest.mark.parametrize("name", [NAME, BIN_NAME])
 @pytest.mark.parametrize("colour", [0.0, 1.0])
-def test_the_shipped_network_tells_one_object_from_what_is_beside_it(scene, colour):
+def test_a_shipped_network_tells_one_object_from_what_is_beside_it(scene, colour, name):
     frame = make_frame(rgb=scene.rgb, depth=scene.depth, K=scene.K)
-    found = affinities_of(frame.rgb, see_surfaces(frame, 0, SegmentConfig()), shipped(), colour)
+    found = affinities_of(frame.rgb, see_surfaces(frame, 0, SegmentConfig()), shipped(name), colour)
     segmap = found.sample(scene.segmap)
     assert np.median(found.object[segmap != 0]) > 0.9
     near = [each for each in zip(found.same, found.offsets, strict=True) if max(each[1]) == 2]
@@ -148,3 +155,18 @@ def test_torchs_threads_change_no_byte(scene):
     finally:
         torch.set_num_threads(before)
     assert found[0] == found[1]
+
+
+def test_the_network_that_knows_bins_is_asked_where_there_is_one(scene):
+    frame = make_frame(rgb=scene.rgb, depth=scene.depth, K=scene.K)
+    config = SegmentConfig()
+    table = see_surfaces(frame, 0, config)
+    outside = np.array([[1.0, 0.0, 9.0]])  # half planes far from all that is seen
+    found = Bin(outside, outside, 0.02, 0.0, 0.1)
+    inside = replace(table, table=replace(table.table, bins=(found,)))
+    own = config.affinities
+    for seen, name in ((table, NAME), (inside, BIN_NAME)):
+        risen = rising_in(frame, seen, config).risen
+        said = affinities_of(frame.rgb, seen, shipped(name), own.colour, risen, own.margin)
+        assert np.array_equal(affinities_in(frame, seen, config).same, said.same)
+        assert said.same.any()
