@@ -24,7 +24,7 @@ from brrp_cli.grasping.plan import plan_grasps
 from brrp_cli.grasping.scene import scene_of
 from brrp_cli.shapes import solids
 
-# Around the box and the L, its floor so thin that both stand on the table.
+# Around the box and the L, without a floor: both stand on the table.
 LENGTH, WIDTH, HEIGHT, THICK = 0.36, 0.19, 0.08, 0.005
 MIDDLE = np.array([-0.005, 0.005, 0.0])
 
