@@ -59,21 +59,22 @@ class OnnxModel:
                 )
             except Exception as error:  # its errors have no common base but Exception
                 last = error
-        raise self._error("cannot be read", last, expected="an ONNX model") from last
+        raise self.error("cannot be read", last, expected="an ONNX model") from last
 
     def run(self, outputs: Sequence[str], inputs: Mapping[str, NDArray[Any]]) -> list[NDArray[Any]]:
         """The outputs, in the order in which they were asked for."""
         try:
             return [np.asarray(out) for out in self._session.run(list(outputs), dict(inputs))]
         except Exception as error:
-            raise self._error("fails when it is run", error) from error
+            raise self.error("fails when it is run", error) from error
 
-    def _error(self, trouble: str, error: Exception, expected: str | None = None) -> BrrpError:
+    def error(self, trouble: str, found: object, expected: str | None = None) -> BrrpError:
+        """What is wrong with the file. trouble : as in "cannot be read"."""
         return self._kind(
             f"{self.what[0].upper()}{self.what[1:]} {trouble}",
             where=self.path,
             expected=expected,
-            found=str(error).splitlines()[0],
+            found=str(found).splitlines()[0],
             fix=self._fix,
         )
 

@@ -12,7 +12,7 @@ false    models, of all, of which a part is more than 3 cm from any true wall; t
 
 With --prior, objects are reconstructed from true masks and grasps are planned (default hand):
 
-grasps   hands of which a true wall lies inside, on the way in or where they close
+grasps   hands that have a part of a true wall in them, open, on their way in or at its end
 best     objects whose best grasp is such a one
 """
 
@@ -31,7 +31,6 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from tabletop.bin import read_walls
 
-from brrp_cli.config.grasping import GraspConfig
 from brrp_cli.config.segmentation import SegmentConfig
 from brrp_cli.errors import BrrpError
 from brrp_cli.geometry import transform_points
@@ -108,7 +107,7 @@ def count_grasps(plan: GraspPlan, points: np.ndarray, found: Found) -> None:
         for rank, grasp in enumerate(item.grasps):
             local = transform_points(np.linalg.inv(grasp.T_cam_gripper), points)
             opening = np.array([grasp.opening])
-            boxes = plan.gripper.boxes(opening, GraspConfig().approach)[0]
+            boxes = plan.gripper.boxes(opening, plan.config.approach)[0]
             inside = (local[None] >= boxes[:, None, 0]) & (local[None] <= boxes[:, None, 1])
             swept = bool(inside.all(axis=-1).any())
             found.grasps, found.swept = found.grasps + 1, found.swept + swept
@@ -152,7 +151,7 @@ def main() -> None:
                     points = np.concatenate([wall.sample(POINTS, seed=0) for wall in walls])
                     count_grasps(plan_grasps(again(frame)), points, found)
             print(line(folder.name, found, again is not None), flush=True)
-    except (BrrpError, OSError) as error:
+    except BrrpError as error:
         sys.exit(str(error))
 
 

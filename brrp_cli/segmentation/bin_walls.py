@@ -25,6 +25,8 @@ log = logging.getLogger(__name__)
 Array = NDArray[np.float64]
 # Corners (8, 3) of a convex solid, metres, camera frame.
 Wall = Array
+# Of what a bin's walls show, from which on it is an object itself.
+MASKED = 0.5
 
 
 def bin_walls(frame: Frame, seed: int, config: SegmentConfig) -> list[list[Wall]]:
@@ -49,7 +51,7 @@ def bin_walls(frame: Frame, seed: int, config: SegmentConfig) -> list[list[Wall]
         walls[there] = Table(table.plane, table.axes, table.hull, (each,)).walls(
             plan[there], height[there] - each.floor, config.bins
         )
-        if not walls.any() or masked[walls].mean() < 0.5:
+        if not walls.any() or masked[walls].mean() < MASKED:
             found.append(walls_of(each, table, plan[there], height[there], config.bins))
     return found
 

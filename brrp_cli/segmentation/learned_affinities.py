@@ -52,13 +52,7 @@ class AffinityModel:
         self._model = OnnxModel(path, WHAT, WeightsError, "install brrp-cli again", threads=1)
         found = self._model.metadata.get("format")
         if found != FORMAT:
-            raise WeightsError(
-                f"{WHAT[0].upper()}{WHAT[1:]} cannot be read",
-                where=path,
-                expected=FORMAT,
-                found=found,
-                fix="install brrp-cli again",
-            )
+            raise self._model.error("cannot be read", found, expected=FORMAT)
 
     def __call__(self, channels: NDArray[np.float32]) -> NDArray[np.float32]:
         """Probabilities (len(OFFSETS) + 1, h, w) from channels (CHANNELS, h, w): affinities, and at

@@ -17,7 +17,6 @@ from table_scene import T_CAM_WORLD, in_camera
 
 from brrp_cli.api import open_result
 from brrp_cli.cli import main
-from brrp_cli.config.grasping import GraspConfig
 from brrp_cli.geometry import transform_points
 from brrp_cli.grasping.grasp import GraspPlan
 from brrp_cli.grasping.plan import plan_grasps
@@ -116,7 +115,7 @@ def swept(plan: GraspPlan) -> int:
     for item in plan.objects:
         for grasp in item.grasps:
             local = transform_points(np.linalg.inv(grasp.T_cam_gripper), points)
-            boxes = plan.gripper.boxes(np.array([grasp.width]), GraspConfig().approach)[0]
+            boxes = plan.gripper.boxes(np.array([grasp.opening]), plan.config.approach)[0]
             inside = (local[None] >= boxes[:, None, 0]) & (local[None] <= boxes[:, None, 1])
             count += bool(inside.all(axis=-1).any())
     return count

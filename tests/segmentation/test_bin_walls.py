@@ -11,11 +11,13 @@ from bin_scene import FLOOR, HEIGHT, LENGTH, T_WORLD_CAM, WALL, WIDTH, YAW, seen
 
 from brrp_cli.config.segmentation import SegmentConfig
 from brrp_cli.demo.layout import camera_pose, turn
+from brrp_cli.errors import FrameError
 from brrp_cli.frames.build import make_frame
 from brrp_cli.geometry import similarity, transform_points
 from brrp_cli.raycast import raycasting_scene
 from brrp_cli.segmentation.bin_walls import bin_walls, segmentation_of
 from brrp_cli.segmentation.outlines import corners_of, normals_of, plain, shifted
+from brrp_cli.segmentation.seen_table import see_table
 from brrp_cli.shapes import solids
 
 CONFIG = SegmentConfig()
@@ -104,7 +106,10 @@ def test_without_a_table_there_are_none():
     rng = np.random.default_rng(0)
     depth = rng.uniform(0.4, 2.0, (120, 160))
     K = np.array([[150.0, 0, 80], [0, 150.0, 60], [0, 0, 1]])
-    assert bin_walls(make_frame(depth=depth, K=K), 0, CONFIG) == []
+    frame = make_frame(depth=depth, K=K)
+    with pytest.raises(FrameError):
+        see_table(frame.points, 0, None, CONFIG)
+    assert bin_walls(frame, 0, CONFIG) == []
 
 
 def test_results_tell_what_a_bin_was():

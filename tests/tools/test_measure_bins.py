@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 import sys
 
 import numpy as np
@@ -67,9 +68,13 @@ def test_walls_that_are_elsewhere_are_false(scenes, monkeypatch, capsys):
 
 
 def test_scenes_without_a_bin_are_told(tmp_path, scenes, monkeypatch):
-    monkeypatch.setattr(sys, "argv", ["measure_bins.py", str(tmp_path)])
-    with pytest.raises(SystemExit, match=str(tmp_path)):
-        main()
+    bare = shutil.copytree(scenes, tmp_path / "bare")
+    for path in bare.glob(f"*/{FILE}"):
+        path.unlink()
+    for folder, what in ((tmp_path / "none", "none"), (bare, "has no bin")):
+        monkeypatch.setattr(sys, "argv", ["measure_bins.py", str(folder)])
+        with pytest.raises(SystemExit, match=what):
+            main()
 
 
 def test_a_bins_walls_are_read_as_they_were_written(tmp_path):

@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import trimesh
 
+from brrp_cli.errors import SceneError
 from tabletop.settle import Panel, rotation
 
 # In the folder of a scene: the floor and the walls, boxes in the world.
@@ -90,8 +91,16 @@ def write_panels(panels: Sequence[Panel], folder: Path) -> None:
 
 
 def read_walls(folder: Path) -> list[trimesh.Trimesh]:
-    """The walls of a scene's bin, boxes, metres, world."""
-    _, *walls = json.loads((folder / FILE).read_text())
+    """The walls of a scene's bin, boxes, metres, world. Errors: SceneError for a scene without."""
+    path = folder / FILE
+    if not path.is_file():
+        raise SceneError(
+            "The scene has no bin",
+            where=path,
+            expected="a scene that tools/make_scenes.py made with --bin",
+            fix="make it anew, with the same options, --bin and --overwrite",
+        )
+    _, *walls = json.loads(path.read_text())
     meshes = []
     for wall in walls:
         T = np.eye(4)

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import onnx
 import torch
+from google.protobuf.message import DecodeError
 from onnx import TensorProto, helper, numpy_helper
 from torch import Tensor, nn
 
@@ -79,7 +80,7 @@ def load_weights(path: Path) -> dict[str, Tensor]:
         found = {each.key: each.value for each in model.metadata_props}.get("format")
         if found != FORMAT:
             raise ValueError(found)
-    except Exception as error:  # protobuf's own exception, OSError
+    except (OSError, ValueError, DecodeError) as error:
         raise WeightsError(
             f"{WHAT[0].upper()}{WHAT[1:]} cannot be read",
             where=path,
