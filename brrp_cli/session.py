@@ -27,6 +27,7 @@ from brrp_cli.frames.frame import Frame
 from brrp_cli.geometry import normalise
 from brrp_cli.mending.again import Again, Objects
 from brrp_cli.mending.mend import mend
+from brrp_cli.mending.strangers import of_left_out
 from brrp_cli.methods.base import EarlierView, Memory, Stream
 from brrp_cli.methods.configuration import MethodConfig
 from brrp_cli.methods.registry import DEFAULT, reconstructing_method
@@ -42,6 +43,7 @@ from brrp_cli.tracking import (
     follow,
     spread_out,
     unmoved,
+    with_known,
 )
 
 if TYPE_CHECKING:
@@ -153,6 +155,8 @@ class Reconstructor:
         """All objects under the ids of their tracks; those that have not moved as they were."""
         assert self._track is not None
         start = time.perf_counter()
+        if self._last is not None and aside is not None:
+            frame = with_known(self._last, frame, aside, self._track)
         followed = (
             first_frame(frame) if self._last is None else follow(self._last, frame, self._track)
         )
@@ -188,7 +192,8 @@ class Reconstructor:
         newest = replace(result, objects=new, image=None)
         self._made = [(result.frame, newest), *left] if new else left
         next_id = max(followed.next_id, max(result.frame.object_ids) + 1)
-        self._last = Followed(result.frame, next_id)
+        left_out = frozenset() if aside is None else of_left_out(result.frame, aside)
+        self._last = Followed(result.frame, next_id, left_out)
         return result
 
     def _mended(

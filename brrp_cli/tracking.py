@@ -21,10 +21,15 @@ from brrp_cli.geometry import transform_points
 
 @dataclass(frozen=True)
 class Followed:
-    """A frame whose ids are those of the tracks; next_id : the first id that is free."""
+    """A frame whose ids are those of the tracks.
+
+    next_id : the first id that is free; left_out : ids of what is recognised in a mask that was
+    left out when masks were made, as what the image's border cuts is
+    """
 
     frame: Frame
     next_id: int
+    left_out: frozenset[int] = frozenset()
 
 
 def first_frame(frame: Frame) -> Followed:
@@ -43,6 +48,21 @@ def follow(last: Followed, frame: Frame, config: TrackConfig) -> Followed:
             track, next_id = next_id, next_id + 1
         segmap[frame.segmap == object_id] = track
     return Followed(frame.with_masks(segmap), next_id)
+
+
+def with_known(
+    last: Followed, frame: Frame, aside: NDArray[np.integer], config: TrackConfig
+) -> Frame:
+    """The frame with those masks that were left out of it, `aside` (H, W), 0 = none, in which an
+    object lies that was recognised in such a mask of the last one."""
+    if not last.left_out:
+        return frame
+    old = np.where(np.isin(last.frame.segmap, list(last.left_out)), last.frame.segmap, BACKGROUND)
+    first = int(frame.segmap.max())
+    new = np.where((aside != BACKGROUND) & (frame.segmap == BACKGROUND), aside + first, BACKGROUND)
+    T_now_last = camera_motion(last.frame, frame, config)
+    known = match(last.frame.with_masks(old), frame.with_masks(new), T_now_last, config)
+    return frame.with_masks(np.where(np.isin(new, list(known)), new, frame.segmap))
 
 
 def unmoved(before: Frame, frame: Frame, config: TrackConfig) -> frozenset[int]:

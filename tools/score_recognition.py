@@ -5,7 +5,8 @@
 For each set of scenes (published layout, as tools/make_scenes.py writes it), over the true objects
 that the prior holds, of which the first view has 1,000 pixels of depth or more and which the
 image's border does not cut: how many are recognised after masks were mended, by what the mask was
-before that. --truth takes the true masks instead.
+before that. Those that the border cuts have a line of their own. --truth takes the true masks
+instead.
 
 own      a mask of its own, IoU over 0.75
 shared   its mask holds another object, too: a quarter of the mask, or 40 % of that object
@@ -122,7 +123,7 @@ def rows_of(
         name = scene.object(object_id).name
         mine = frame.segmap == object_id
         cut = border_share(mine) > SegmentConfig().left_out.cut
-        if name not in prior.names or cut or (mine & frame.valid).sum() < least:
+        if name not in prior.names or (mine & frame.valid).sum() < least:
             continue
         why, others = cause(frame.segmap[frame.valid], masks[frame.valid], object_id)
         found = [
@@ -138,6 +139,7 @@ def rows_of(
                 "object": name,
                 "pixels": int((mine & frame.valid).sum()),
                 "cause": why,
+                "cut": cut,
                 "shared_with": [scene.object(i).name for i in others],
                 "recognised": bool(found),
                 "distance": _distance(found[0], scene, object_id, prior, data_root, frame)
@@ -193,7 +195,8 @@ def share_of(objects: list[Row]) -> str:
 
 def report(name: str, rows: list[Row]) -> str:
     """Lines of one set: all, and by cause."""
-    objects = [row for row in rows if "object" in row]
+    every = [row for row in rows if "object" in row]
+    objects, cut = [row for row in every if not row["cut"]], [row for row in every if row["cut"]]
     taken = [row for row in rows if "taken" in row]
     wrong = [row for row in taken if row["taken"] != row["is"]]
     masks = sum(row["masks"] for row in rows if "masks" in row)
@@ -209,6 +212,9 @@ def report(name: str, rows: list[Row]) -> str:
             lines.append(
                 f"  {why:8} {len(those):4}, recognised {sum(r['recognised'] for r in those):4}"
             )
+    if cut:
+        many = sum(row["recognised"] for row in cut)
+        lines.append(f"  cut by the border {len(cut):4}, recognised {many:4}")
     if taken:
         lines.append(f"  {weights_told(taken)}")
     return "\n".join(lines)

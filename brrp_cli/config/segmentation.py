@@ -40,6 +40,8 @@ class TableConfig:
     parallel : degrees between the table and a floor; height : metres of the table above a floor;
     of_floor : points of the table, as a part of the floor's
     cell : metres of the grid on which the plane's points hang together
+    beyond : metres that the table goes on beyond the image's border, where it reaches it; blind :
+        part of the image along its border that may be without depth
     """
 
     points: int = 40_000
@@ -53,6 +55,8 @@ class TableConfig:
     height: float = 0.2
     of_floor: float = share(0.25)
     cell: float = 0.02
+    beyond: float = 0.2
+    blind: float = share(0.16)
 
 
 @dataclass(frozen=True)
@@ -275,7 +279,8 @@ class PromptConfig:
 class LeftOutConfig:
     """Masks of what is cut by the image's border or stands nowhere on the support surface.
 
-    cut : part of a mask's outline on the image's border from which on it is left out
+    cut : part of a mask's outline on the image's border from which on it is left out; tell : pixels
+        with depth of such a mask from which on a stored object may be recognised in it
     lowest : percentile of its heights that counts as its lower end; stands : metres; what ends no
         higher stands on the table, and so does what ends no higher than `round` times its top, but
         `round_stands` metres at most: the lower half of a ball. `over_stands` metres if more than
@@ -290,6 +295,7 @@ class LeftOutConfig:
     """
 
     cut: float = share(0.08)
+    tell: int = between(1000, 0, 1_000_000)
     lowest: float = between(5.0, 0.0, 100.0)
     stands: float = 0.04
     round: float = share(0.6)

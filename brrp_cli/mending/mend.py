@@ -13,6 +13,7 @@ from brrp_cli.config.segmentation import SegmentConfig
 from brrp_cli.mending.again import Again
 from brrp_cli.mending.claim import claim
 from brrp_cli.mending.regroup import regroup
+from brrp_cli.mending.strangers import without_strangers
 from brrp_cli.prior.store import Prior
 from brrp_cli.reconstruction import Reconstruction
 
@@ -27,16 +28,19 @@ def mend(
     first_free: int = 1,
 ) -> Reconstruction:
     """The reconstruction with masks that recognised objects claimed (claim.py), and that were
-    regrouped where that lets one be recognised (regroup.py), which then claims its own.
+    regrouped where that lets one be recognised (regroup.py), which then claims its own. What was
+    left out and is not recognised has no mask (strangers.py).
 
     again : reconstructs those objects of a frame whose ids are given
     aside : (H, W) masks that were left out, 0 = none; asked : ids whose masks may be regrouped,
     None = all; first_free : ids of new objects are this at least
-    Its frame has the masks as they were mended; without a prior nothing is recognised and nothing
-    changes. `seconds` gains "mending".
+    Its frame has the masks as they were mended; without a prior nothing is recognised. `seconds`
+    gains "mending".
+
+    Errors: FrameError if no mask is left.
     """
     if prior is None:
-        return result
+        return result if aside is None else without_strangers(result, aside, config)
     start, first = time.perf_counter(), dict(result.seconds)
     before = set(result.frame.object_ids)
     mended = claim(result, prior, again, config.mend, first_free)
@@ -45,4 +49,6 @@ def mend(
     grouped = regroup(mended, prior, again, config, aside, asked, first_free)
     if grouped is not mended:
         mended = claim(grouped, prior, again, config.mend, first_free)
+    if aside is not None:
+        mended = without_strangers(mended, aside, config)
     return replace(mended, seconds={**first, "mending": time.perf_counter() - start})

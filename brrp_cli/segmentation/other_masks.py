@@ -43,7 +43,7 @@ def other_masks(
 ) -> list[OtherMask]:
     """Masks of what was left out, `aside` (H, W); unions of these and of the masks `ids` with their
     neighbours, all of them and two by two, and with those near them in the same colours; and parts
-    of each of `ids`, by its inner boundary and by colour.
+    of each of both, by its inner boundary and by colour.
     `config.regroup.most` of them at most.
 
     whole : ids of masks that are not cut
@@ -56,14 +56,15 @@ def other_masks(
     found = [
         OtherMask(np.isin(both.segmap, list(group)), group.difference(left_out)) for group in groups
     ]
-    large = [i for i in ids if i not in whole and _size(frame, frame.segmap == i) >= own.least_cut]
+    may = [*(i for i in ids if i not in whole), *left_out]
+    large = [i for i in may if _size(frame, both.segmap == i) >= own.least_cut]
     if large:
         edges = boundary_of(frame, seed, config)
         for i in large:
             rng = child_rng(seed, "colour groups", i)
             found += [
-                OtherMask(part, frozenset([i]), cut=True)
-                for part in parts(frame, i, edges, config, rng)
+                OtherMask(part, frozenset([i]).difference(left_out), cut=True)
+                for part in parts(both, i, edges, config, rng)
             ]
     return [each for each in found if _size(frame, each.mask) >= own.least_pixels][: own.most]
 

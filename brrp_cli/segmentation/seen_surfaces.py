@@ -29,7 +29,8 @@ class SeenSurfaces:
 
     depth : (H, W) metres, NaN = none; points : (H, W, 3) metres, camera frame; valid : (H, W)
     height : (H, W) metres above the table or a floor of a bin; plan : (H, W, 2) metres, on it;
-    beside : (H, W) metres beside the table, 0 or less on it; NaN where there is no depth
+    beside : (H, W) metres beside the table, seen or beyond the image, 0 or less on it; NaN where
+    there is no depth
     normals : (H, W, 3) unit, toward the camera; angles : (H, W) degrees of hollow creases; jumps :
     (H, W) pixels beside which depth jumps
     """

@@ -8,7 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brrp_cli.config.segmentation import SegmentConfig
+from brrp_cli.segmentation.beyond_image import beyond_image
 from brrp_cli.segmentation.bins import find_bins
+from brrp_cli.segmentation.hulls import beyond_hull
 from brrp_cli.segmentation.table_plane import Table, find_table
 
 
@@ -17,7 +19,7 @@ class SeenTable:
     """A table, and where points lie over it; NaN where there is no depth.
 
     plan : (H, W, 2) metres, on it; height : (H, W) metres above it or a floor of a bin; beside :
-    (H, W) metres beside it, 0 or less on it
+    (H, W) metres beside it and beside what of it lies beyond the image, 0 or less on it
     """
 
     table: Table
@@ -39,4 +41,8 @@ def see_table(
     beside = table.beside(plan)
     near = beside <= config.bins.beside
     table = replace(table, bins=find_bins(plan[near], height[near], config.bins))
+    flat = (np.abs(height) < config.table.tolerance) & (beside <= 0)
+    beyond = beyond_image(plan, flat, config.table)
+    if beyond is not None:
+        beside = np.minimum(beside, beyond_hull(beyond, plan.reshape(-1, 2)).reshape(beside.shape))
     return SeenTable(table, plan, table.above_floors(plan, height), beside)

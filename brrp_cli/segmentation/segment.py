@@ -19,7 +19,7 @@ from brrp_cli.segmentation.beneath import hides_its_foot
 from brrp_cli.segmentation.components import absorb_small
 from brrp_cli.segmentation.fill_concavities import fill_inside
 from brrp_cli.segmentation.join_insides import join_insides
-from brrp_cli.segmentation.left_out import EDGE, IN_THE_AIR, left_out, told
+from brrp_cli.segmentation.left_out import CUT, IN_THE_AIR, left_out, told
 from brrp_cli.segmentation.part_objects import Parted, part_objects
 from brrp_cli.segmentation.refine_borders import refine_borders
 from brrp_cli.segmentation.region_growing import fill_holes, grow
@@ -44,15 +44,19 @@ def segment(
 
     Errors: FrameError if there is no table or nothing stands on it.
     """
-    return segment_and_aside(frame, seed, config, keep_all=keep_all)[0]
+    segmap, aside = segment_and_aside(frame, seed, config, keep_all=keep_all)
+    if (aside[segmap != BACKGROUND] != BACKGROUND).all():
+        raise nothing_stands(frame, config or SegmentConfig())
+    return segmap
 
 
 def segment_and_aside(
     frame: Frame, seed: int = 0, config: SegmentConfig | None = None, *, keep_all: bool = False
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """What `segment` gives, and the masks (H, W), 0 = none, that it left out because they seem to
-    stand nowhere on the table, or to be a smear of depth: what lies on something else may look like
-    the former, and what is flat and has no depth around it like the latter."""
+    """What `segment` gives, and masks (H, W), 0 = none, that it leaves out. What lies on
+    something else may seem to stand nowhere, what is flat and has no depth around it to be a smear,
+    and of what the border cuts a stored object tells the rest. Where there is nothing else, these
+    are the masks, too. mending/strangers.py leaves out again what is not recognised among them."""
     config = config or SegmentConfig()
     seen = see_surfaces(frame, seed, config)
     points, table = seen.points, seen.table
@@ -78,7 +82,19 @@ def segment_and_aside(
     aside = np.zeros_like(segmap)
     if not keep_all:
         segmap, aside = _without(segmap, frame, table, config)
-    return _numbered(segmap, frame, config), aside
+    return _numbered(segmap if segmap.any() else aside, frame, config), aside
+
+
+def nothing_stands(frame: Frame, config: SegmentConfig) -> FrameError:
+    """The error where no mask is left."""
+    return FrameError(
+        "Nothing stands on the table",
+        where=frame.source,
+        expected="objects that rise above their support plane",
+        found=f"none that shows {config.min_area * 1e4:g} cm^2 of itself",
+        fix="check the unit of depth (--depth-scale), move the camera nearer, keep what the image's"
+        " border cuts (--all), or pass masks with --masks",
+    )
 
 
 def _may_rise(
@@ -95,7 +111,7 @@ def _without(
     segmap: NDArray[np.int64], frame: Frame, table: Table, config: SegmentConfig
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """The masks without those that are left out, which the log tells, and of the latter those that
-    may be whole objects."""
+    a stored object may explain."""
     points = np.where(frame.valid[..., None], frame.points, np.nan)
     height = table.height(points)
     over, masked = np.zeros(frame.shape, dtype=bool), (segmap > 0) & frame.valid
@@ -108,11 +124,14 @@ def _without(
         or not hides_its_foot(segmap == i, frame, table.plane, over, config.left_out)
     }
     if reasons:
-        log.info("Masks left out: %s (--all keeps them)", told(reasons))
-    whole = [i for i, reason in reasons.items() if reason in (IN_THE_AIR, EDGE)]
+        log.info("Masks left out, unless recognised: %s (--all keeps them)", told(reasons))
+    out = np.isin(segmap, list(reasons))
+    # Of what shows a corner of itself alone, many stored objects could tell the rest.
+    shown = np.bincount(segmap[frame.valid], minlength=int(segmap.max()) + 1)
+    corners = [i for i, why in reasons.items() if why == CUT and shown[i] < config.left_out.tell]
     return (
-        np.where(np.isin(segmap, list(reasons)), BACKGROUND, segmap),
-        np.where(np.isin(segmap, whole), segmap, BACKGROUND),
+        np.where(out, BACKGROUND, segmap),
+        np.where(out & ~np.isin(segmap, corners), segmap, BACKGROUND),
     )
 
 
@@ -151,14 +170,7 @@ def _numbered(segmap: NDArray[np.int64], frame: Frame, config: SegmentConfig) ->
         int(i): float(columns[segmap == i].mean()) for i in np.unique(segmap) if i != BACKGROUND
     }
     if not middles:
-        raise FrameError(
-            "Nothing stands on the table",
-            where=frame.source,
-            expected="objects that rise above their support plane",
-            found=f"none that shows {config.min_area * 1e4:g} cm^2 of itself",
-            fix="check the unit of depth (--depth-scale), move the camera nearer, keep what the"
-            " image's border cuts (--all), or pass masks with --masks",
-        )
+        raise nothing_stands(frame, config)
     numbered = np.zeros_like(segmap)
     for number, old in enumerate(sorted(middles, key=lambda i: middles[i]), start=1):
         numbered[segmap == old] = number

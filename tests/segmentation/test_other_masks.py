@@ -74,6 +74,12 @@ def test_two_things_in_one_mask_are_its_halves():
     for object_id in (1, 2):
         mask = truth.segmap == object_id
         assert max((each.mask & mask).sum() / (each.mask | mask).sum() for each in halves) > 0.95
+    # Also of a mask that was left out, as where the image's border cuts one of the two.
+    bare = replace(truth, segmap=np.zeros_like(truth.segmap))
+    whole, *parts = other_masks(bare, [], frame.segmap, depth_alone)
+    assert (whole.mask == (truth.segmap > 0)).all() and not whole.of and not whole.cut
+    assert [(each.of, each.cut) for each in parts] == [(frozenset(), True)] * 2
+    assert all((a.mask == b.mask).all() for a, b in zip(parts, halves, strict=True))
 
 
 def test_what_was_left_out_is_tried_where_nothing_else_is():

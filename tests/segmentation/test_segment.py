@@ -207,6 +207,27 @@ def test_what_the_border_cuts_is_kept_on_demand_alone():
     assert max(overlap(everything == i, cut) for i in (1, 2)) > 0.7
 
 
+def test_what_the_border_cuts_is_not_forgotten_unless_it_is_a_corner_of_something():
+    frame = boxes(((0.1, 0.1, 0.06), 0, 0, 0), ((0.1, 0.3, 0.08), 0.0, 0.33, 0))
+    found, aside = segment_and_aside(frame)
+    assert overlap(found > 0, frame.segmap == 1) > 0.7
+    assert overlap(aside > 0, frame.segmap == 2) > 0.7
+    shown = int((aside > 0).sum())
+    asked = SegmentConfig(left_out=replace(LeftOutConfig(), tell=shown + 1))
+    again, corners = segment_and_aside(frame, config=asked)
+    assert (again == found).all() and not corners.any()
+
+
+def test_where_the_border_cuts_all_there_are_masks_for_a_prior_alone():
+    """What is recognised in them is an object; without a prior nothing is."""
+    frame = boxes(((0.1, 0.3, 0.08), 0.0, 0.33, 0))
+    with pytest.raises(FrameError, match="Nothing stands on the table"):
+        segment(frame)
+    masks, aside = segment_and_aside(frame)
+    assert masks.max() == 1 and ((masks > 0) == (aside > 0)).all()
+    assert overlap(masks > 0, frame.segmap == 1) > 0.7
+
+
 def test_what_hangs_in_the_air_is_left_out_and_what_stands_on_a_thing_is_not():
     things = [((0.1, 0.1, 0.06), 0, 0, 0), ((0.06, 0.06, 0.06), 0, 0, 0.06)]
     assert segment(boxes(*things)).max() == 2

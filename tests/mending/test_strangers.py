@@ -1,0 +1,114 @@
+"""What the image's border cuts, with and without a stored object that tells the rest."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from painted_scene import STRANGE, THINGS, photograph, write_things
+
+from brrp_cli import Reconstructor
+from brrp_cli.config.segmentation import LeftOutConfig, SegmentConfig
+from brrp_cli.errors import FrameError
+from brrp_cli.mending.strangers import of_left_out, without_strangers
+from brrp_cli.prior.build.build import build_prior
+from brrp_cli.prior.parameters import BuildParameters
+from brrp_cli.prior.store import open_prior
+from brrp_cli.reconstruction import OK, ObjectReconstruction, Retrieved
+
+WHOLE, CUT, STRANGER = 1, 2, 3
+AT_THE_BORDER, BEYOND = (0.34, 0.0), (0.23, -0.3)
+# A corner of these small images has fewer pixels than one of a camera's.
+SEGMENTATION = SegmentConfig(left_out=replace(LeftOutConfig(), tell=300))
+
+
+@pytest.fixture(scope="module")
+def session(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("cut")
+    parameters = BuildParameters(samples=400, surface_points=400, dense_points=4_000)
+    build_prior(write_things(folder / "meshes"), folder / "prior", parameters, workers=1)
+    with Reconstructor(
+        open_prior(folder / "prior"), retriever="appearance", workers=1, segmentation=SEGMENTATION
+    ) as session:
+        yield session
+
+
+def unmasked(frame):
+    return frame.with_masks(np.zeros_like(frame.segmap))
+
+
+def names(result):
+    return [item.outcome.name for item in result.objects]
+
+
+@pytest.fixture(scope="module")
+def scene():
+    return photograph(
+        {
+            WHOLE: (*THINGS["red_box"], -0.1, 0.0),
+            CUT: (*THINGS["blue_box"], *AT_THE_BORDER),
+            STRANGER: (*STRANGE, *BEYOND),
+        }
+    )
+
+
+@pytest.fixture(scope="module")
+def first(scene, session):
+    return session(unmasked(scene))
+
+
+def on_the_border(mask):
+    inner = mask[1:-1, 1:-1].sum()
+    return 0 < inner < mask.sum()
+
+
+def test_a_stored_object_that_the_border_cuts_is_found_and_a_stranger_is_not(scene, first):
+    assert all(on_the_border(scene.segmap == i) for i in (CUT, STRANGER))
+    assert sorted(names(first)) == ["blue_box", "red_box"]
+    assert sorted(first.frame.object_ids) == [item.object_id for item in first.objects]
+    (cut,) = (item for item in first.objects if item.outcome.name == "blue_box")
+    mask, true = first.frame.segmap == cut.object_id, scene.segmap == CUT
+    assert (mask & true).sum() > 0.8 * (mask | true).sum()
+    # The mesh is the whole box, beyond the image, too.
+    assert cut.surface is not None
+    assert cut.surface.as_trimesh().volume == pytest.approx(0.10 * 0.06 * 0.12, rel=0.1)
+
+
+def test_where_the_border_cuts_all_there_is_what_is_recognised_alone_is_an_object(session):
+    cut = photograph({CUT: (*THINGS["blue_box"], *AT_THE_BORDER)})
+    assert names(session(unmasked(cut))) == ["blue_box"]
+    with pytest.raises(FrameError, match="Nothing stands on the table"):
+        session(unmasked(photograph({STRANGER: (*STRANGE, *BEYOND)})))
+
+
+def test_an_object_that_the_border_cuts_keeps_its_id_and_what_was_made_of_it(scene, session):
+    with Reconstructor(
+        session._prior, retriever="appearance", workers=1, segmentation=SEGMENTATION, track=True
+    ) as tracking:
+        first, second = tracking(unmasked(scene)), tracking(unmasked(scene))
+    assert len(first.objects) == 2
+    assert [i.object_id for i in second.objects] == [i.object_id for i in first.objects]
+    assert all(
+        new.posterior is old.posterior
+        for new, old in zip(second.objects, first.objects, strict=True)
+    )
+
+
+def test_what_was_left_out_stays_out_unless_it_is_recognised(scene, first):
+    aside = np.where(scene.segmap == WHOLE, 0, scene.segmap)
+    assert of_left_out(scene, aside) == {CUT, STRANGER}
+    half = np.cumsum(scene.segmap == WHOLE).reshape(scene.shape)
+    smaller = np.where((scene.segmap == WHOLE) & (half < 0.4 * half.max()), 9, 0)
+    assert of_left_out(scene, smaller) == set()
+    known = Retrieved("blue_box", 0.9, np.eye(4), weight=0.9)
+    objects = [
+        ObjectReconstruction(WHOLE, OK),
+        ObjectReconstruction(CUT, OK, retrieved=[known]),
+        ObjectReconstruction(STRANGER, OK),
+    ]
+    result = replace(first, frame=scene, objects=objects)
+    found = without_strangers(result, aside, SegmentConfig())
+    assert [each.object_id for each in found.objects] == [WHOLE, CUT]
+    assert found.frame.object_ids == [WHOLE, CUT]
+    assert without_strangers(result, np.zeros_like(aside), SegmentConfig()) is result
