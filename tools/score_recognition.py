@@ -53,7 +53,7 @@ from brrp_cli.prior.store import Prior, open_prior
 from brrp_cli.raycast import raycasting_scene
 from brrp_cli.reconstruction import Retrieved
 from brrp_cli.segmentation.left_out import border_share
-from brrp_cli.segmentation.segment import segment
+from brrp_cli.segmentation.segment import segment_and_aside
 from brrp_cli.session import Reconstructor
 
 # Edges of the bins in which weights are held against what is right.
@@ -110,7 +110,7 @@ def rows_of(
     """A row for each object that the prior holds, and one for each mask taken for one."""
     frame = scene.view(0)
     start = time.perf_counter()
-    masks = frame.segmap if given else segment(frame)
+    masks = frame.segmap if given else segment_and_aside(frame)[0]
     seconds = time.perf_counter() - start
     unmasked = replace(frame, segmap=np.zeros_like(frame.segmap))
     result = again(frame if given else unmasked)

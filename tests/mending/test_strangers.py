@@ -101,14 +101,31 @@ def test_what_was_left_out_stays_out_unless_it_is_recognised(scene, first):
     half = np.cumsum(scene.segmap == WHOLE).reshape(scene.shape)
     smaller = np.where((scene.segmap == WHOLE) & (half < 0.4 * half.max()), 9, 0)
     assert of_left_out(scene, smaller) == set()
-    known = Retrieved("blue_box", 0.9, np.eye(4), weight=0.9)
+
+    found = without_strangers(taken(first, scene, 0.96), aside, SegmentConfig())
+    assert [each.object_id for each in found.objects] == [WHOLE, CUT]
+    assert found.frame.object_ids == [WHOLE, CUT]
+    result = taken(first, scene, 0.96)
+    assert without_strangers(result, np.zeros_like(aside), SegmentConfig()) is result
+
+
+def test_what_the_border_cuts_is_a_part_and_needs_more_weight(first, scene):
+    """As a part of a mask does (`regroup.sure`); what seems to hang needs `regroup.whole`."""
+    result = taken(first, scene, 0.9)
+    left = without_strangers(result, scene.segmap == CUT, SegmentConfig())
+    assert [each.object_id for each in left.objects] == [WHOLE, STRANGER]
+    inside = np.zeros(scene.shape, np.int64)
+    inside[100:140, 100:140] = CUT
+    hanging = replace(result, frame=scene.with_masks(inside), objects=result.objects[1:2])
+    assert without_strangers(hanging, inside, SegmentConfig()) is hanging
+
+
+def taken(first, scene, weight):
+    """The whole object, the cut one taken for a stored one with that weight, and a stranger."""
+    known = Retrieved("blue_box", 0.9, np.eye(4), weight=weight)
     objects = [
         ObjectReconstruction(WHOLE, OK),
         ObjectReconstruction(CUT, OK, retrieved=[known]),
         ObjectReconstruction(STRANGER, OK),
     ]
-    result = replace(first, frame=scene, objects=objects)
-    found = without_strangers(result, aside, SegmentConfig())
-    assert [each.object_id for each in found.objects] == [WHOLE, CUT]
-    assert found.frame.object_ids == [WHOLE, CUT]
-    assert without_strangers(result, np.zeros_like(aside), SegmentConfig()) is result
+    return replace(first, frame=scene, objects=objects)
