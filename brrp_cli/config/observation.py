@@ -27,6 +27,28 @@ class FloorConfig:
 
 
 @dataclass(frozen=True)
+class WallConfig:
+    """A wall behind the table, where it is the larger plane (observation/walls.py).
+
+    square : degrees by which their angle may differ from a right one; of_wall : points of the table
+    as a part of the wall's, at least; in_front : part of each one's points, those nearer to it than
+    `near` metres, that lie in front of the other
+    cell : metres of a plane's grid; low : metres within which what lies over a cell touches it;
+    clear : metres from both planes from which on something is a thing; more : part of its cells by
+    which the table is touched more
+    """
+
+    square: float = between(20.0, 0.0, 90.0)
+    of_wall: float = share(0.2)
+    in_front: float = share(0.9)
+    near: float = 0.012
+    cell: float = 0.02
+    low: float = 0.03
+    clear: float = 0.02
+    more: float = share(0.1)
+
+
+@dataclass(frozen=True)
 class ObservationConfig:
     """Observed samples: surface, stratified rays, below the plane (paper, section IV-C).
 
@@ -37,6 +59,7 @@ class ObservationConfig:
         plane_tolerance : of its inliers; plane_iterations : of RANSAC, on plane_ransac_points
         drawn points at most; plane_min_points : that a plane needs
     floor : where the plane around the objects is another one; None: it is never
+    wall : where the largest plane is a wall; None: it is never
     below_draws : samples below the plane within `below_radius`, metres, of the object's middle
     free_cell, surface_cell : metres, of grids in which samples of one label are thinned
     """
@@ -51,6 +74,7 @@ class ObservationConfig:
     plane_ransac_points: int = 4_000
     plane_min_points: int = 100
     floor: FloorConfig | None = field(default_factory=FloorConfig)
+    wall: WallConfig | None = field(default_factory=WallConfig)
     below_draws: int = 50_000
     below_radius: float = 0.2
     free_cell: float = 0.015

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from brrp_cli.config.mending import MendConfig, RegroupConfig
+from brrp_cli.config.observation import WallConfig
 from brrp_cli.config.ranges import between, share
 
 
@@ -42,6 +43,7 @@ class TableConfig:
     cell : metres of the grid on which the plane's points hang together
     beyond : metres that the table goes on beyond the image's border, where it reaches it; blind :
         part of the image along its border that may be without depth
+    wall : which of two planes that meet in a corner is none
     """
 
     points: int = 40_000
@@ -57,6 +59,7 @@ class TableConfig:
     cell: float = 0.02
     beyond: float = 0.2
     blind: float = share(0.16)
+    wall: WallConfig = field(default_factory=WallConfig)
 
 
 @dataclass(frozen=True)

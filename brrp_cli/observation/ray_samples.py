@@ -16,7 +16,8 @@ from brrp_cli.config import ObservationConfig
 from brrp_cli.frames.frame import BACKGROUND, Frame
 from brrp_cli.frames.last_frame import kept_for_last_frame
 from brrp_cli.observation.subsample import grid_subsample
-from brrp_cli.observation.support_plane import Plane, fit_plane, floor_beneath
+from brrp_cli.observation.support_plane import Plane, floor_beneath
+from brrp_cli.observation.walls import supporting_plane
 from brrp_cli.seeds import child_rng
 from brrp_cli.threads import in_threads
 
@@ -149,10 +150,11 @@ def scene_plane(frame: Frame, config: ObservationConfig, seed: int) -> Plane | N
     if not centers:
         return None
     background = frame.points[frame.valid & (frame.segmap == BACKGROUND)]
-    plane = fit_plane(background, config, seed, np.mean(centers, axis=0))
+    things = np.concatenate(points)
+    plane = supporting_plane(background, things, config, seed, np.mean(centers, axis=0))
     if plane is None or config.floor is None:
         return plane
-    return floor_beneath(plane, background, np.concatenate(points), config.floor)
+    return floor_beneath(plane, background, things, config.floor)
 
 
 def ray_samples(

@@ -19,7 +19,8 @@ class SeenTable:
     """A table, and where points lie over it; NaN where there is no depth.
 
     plan : (H, W, 2) metres, on it; height : (H, W) metres above it or a floor of a bin; beside :
-    (H, W) metres beside it and beside what of it lies beyond the image, 0 or less on it
+    (H, W) metres beside it and beside what of it lies beyond the image, 0 or less on it, infinite
+    on a wall behind it
     """
 
     table: Table
@@ -45,4 +46,6 @@ def see_table(
     beyond = beyond_image(plan, flat, config.table)
     if beyond is not None:
         beside = np.minimum(beside, beyond_hull(beyond, plan.reshape(-1, 2)).reshape(beside.shape))
+    if table.backs:
+        beside[table.ends_at(points, config.table.wall.near)] = np.inf
     return SeenTable(table, plan, table.above_floors(plan, height), beside)

@@ -7,10 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from brrp_cli.config.observation import WallConfig
 from brrp_cli.config.segmentation import BinsConfig, TableConfig
 from brrp_cli.dependencies import import_library
 from brrp_cli.errors import FrameError
 from brrp_cli.observation.support_plane import Plane, largest_plane
+from brrp_cli.observation.walls import is_wall
 from brrp_cli.seeds import child_rng, child_seed
 from brrp_cli.segmentation.bins import Bin
 from brrp_cli.segmentation.hulls import beyond_hull, convex_hull, in_hull
@@ -24,12 +26,14 @@ class Table:
     axes : (2, 3) float64, unit, spanning the plane: plan coordinates are points @ axes.T
     hull : (m, 3) float64: plan points p with hull[:, :2] @ p + hull[:, 2] <= 0 lie on the table
     bins : on the table; they count as part of it
+    backs : walls behind it, turned to the camera
     """
 
     plane: Plane
     axes: NDArray[np.float64]
     hull: NDArray[np.float64]
     bins: tuple[Bin, ...] = ()
+    backs: tuple[Plane, ...] = ()
 
     def plan(self, points: NDArray[np.floating]) -> NDArray[np.float64]:
         """Plan coordinates (..., 2), metres, of points (..., 3), camera frame."""
@@ -58,6 +62,15 @@ class Table:
             above.reshape(-1)[in_hull(each.outside, flat, 0.0)] -= each.floor
         return above
 
+    def ends_at(self, points: NDArray[np.floating], near: float) -> NDArray[np.bool_]:
+        """(...,) which of points (..., 3), metres, camera frame, are a wall behind the table, or
+        behind that: nearer to it than `near` metres for a depth of one, which grow with its
+        square."""
+        behind = np.zeros(points.shape[:-1], dtype=bool)
+        for back in self.backs:
+            behind |= back.signed_distance(points) < near * np.maximum(points[..., 2], 1.0) ** 2
+        return behind
+
     def walls(
         self, plan: NDArray[np.floating], height: NDArray[np.floating], config: BinsConfig
     ) -> NDArray[np.bool_]:
@@ -85,9 +98,9 @@ def find_table(
 ) -> Table:
     """The support plane of points (n, 3), metres, camera frame; bins are not looked for.
 
-    The planes with most points are found one after the other (RANSAC). The table is the largest,
-    or, where a floor is larger, a plane that lies well above it, is parallel to it and has a
-    good part of its points.
+    The planes with most points are found one after the other (RANSAC). The table is the largest
+    that is no wall (observation/walls.py), or, where a floor is larger, a plane that lies well
+    above it, is parallel to it and has a good part of its points.
 
     source : for messages. Errors: FrameError if no plane holds `config.least` of the points.
     """
@@ -104,13 +117,14 @@ def find_table(
             fix="check the unit of depth (--depth-scale), take the picture so that more of the"
             " table is seen, or pass masks with --masks",
         )
-    plane = _above_the_floor(planes, config)
+    backs, rest = _walls_and_rest(planes, points, config.wall)
+    plane = _above_the_floor(rest, config)
     axes = np.linalg.svd(plane.normal[None])[2][1:]
     on = (points @ axes.T)[np.abs(plane.signed_distance(points)) < config.tolerance]
     hull = convex_hull(_largest_patch(on, config.cell))
     if hull is None:
         raise FrameError("The support plane has no extent", where=source)
-    return Table(plane=plane, axes=axes, hull=hull)
+    return Table(plane=plane, axes=axes, hull=hull, backs=backs)
 
 
 def _largest_planes(
@@ -142,6 +156,20 @@ def _largest_planes(
         planes.append((plane, int(inlier.sum())))
         rest = rest[~inlier]
     return sorted(planes, key=lambda pair: -pair[1])
+
+
+def _walls_and_rest(
+    planes: list[tuple[Plane, int]], points: NDArray[np.floating], config: WallConfig
+) -> tuple[tuple[Plane, ...], list[tuple[Plane, int]]]:
+    """Those of the planes that are walls behind one of the others, and the others."""
+    walls = [
+        any(is_wall(plane, table, points, points, config) for table, _ in planes)
+        for plane, _ in planes
+    ]
+    rest = [pair for pair, wall in zip(planes, walls, strict=True) if not wall]
+    if not rest:
+        return (), planes
+    return tuple(plane for (plane, _), wall in zip(planes, walls, strict=True) if wall), rest
 
 
 def _above_the_floor(planes: list[tuple[Plane, int]], config: TableConfig) -> Plane:

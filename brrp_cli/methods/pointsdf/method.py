@@ -31,7 +31,8 @@ from brrp_cli.methods.pointsdf.farthest_points import farthest_points
 from brrp_cli.methods.pointsdf.weights import OWN_WEIGHTS, Weights, load_weights
 from brrp_cli.observation.ray_samples import box_center
 from brrp_cli.observation.strays import without_strays
-from brrp_cli.observation.support_plane import Plane, fit_plane
+from brrp_cli.observation.support_plane import Plane
+from brrp_cli.observation.walls import supporting_plane
 from brrp_cli.progress import progress
 from brrp_cli.reconstruction import (
     METRES,
@@ -193,7 +194,7 @@ def _plane(frame: Frame, config: PointSDFConfig, seed: int) -> Plane | None:
     seen = frame.points[frame.valid & (frame.segmap != BACKGROUND)]
     if not len(seen):
         return None
-    return fit_plane(background, config.observation, seed, box_center(seen))
+    return supporting_plane(background, seen, config.observation, seed, box_center(seen))
 
 
 @lru_cache(maxsize=4)
