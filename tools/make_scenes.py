@@ -22,6 +22,8 @@ what stands where stays as it is.
 where it has one: can on can, jar in bowl. It draws other scenes than a set without it.
 `--bin` lets them lie in a bin of any size, which is background, as the table is. It draws other
 scenes than a set without it.
+`--wall` puts a wall behind the objects, which is background, too. Depth and colours differ from a
+set without it.
 `--distance`, `--elevation` and `--roll` say where cameras stand: `--elevation 70 89` looks down,
 `--distance 0.3 0.5` is a camera at a wrist, which `--roll -180 180` turns about its line of sight.
 
@@ -89,6 +91,7 @@ def _size(_context: click.Context, _option: click.Parameter, value: str) -> tupl
 @click.option("--light", default="plain", show_default=True, type=click.Choice(list(LIGHTS)))
 @click.option("--stack", "stacked", is_flag=True, help="Set objects on and into one another.")
 @click.option("--bin", "binned", is_flag=True, help="Drop objects into a bin.")
+@click.option("--wall", "walled", is_flag=True, help="Put a wall behind them.")
 @click.option("--size", default="640x480", show_default=True, callback=_size)
 @click.option(
     "--distance",
@@ -132,6 +135,7 @@ def main(
     light: str,
     stacked: bool,
     binned: bool,
+    walled: bool,
     size: tuple[int, int],
     distance: tuple[float, float],
     elevation: tuple[float, float],
@@ -149,6 +153,8 @@ def main(
             )
         if stacked and binned:
             raise click.UsageError("--stack and --bin exclude each other")
+        if walled and (binned or views > 1):
+            raise click.UsageError("--wall takes --views 1, whose back it is, and no --bin")
         if data_root is None:
             if meshes is None:
                 raise click.UsageError("name the meshes: --meshes, or --data-root with --check")
@@ -179,6 +185,7 @@ def main(
             sensor,
             stacked,
             binned,
+            walled,
             Standpoint(distance, elevation, roll),
         )
         _report(list(_make_all(plan, scenes, workers)), output)

@@ -180,9 +180,37 @@ def test_a_bins_walls_stand_around_its_floor(seed):
     assert len(spans) == 2
 
 
-def test_bins_and_stacks_exclude_each_other(data):
-    result = generate(data, data / "both", "--bin", "--stack")
-    assert result.exit_code == 2 and "exclude each other" in result.output
+def test_a_wall_stands_behind_what_the_camera_sees_and_moves_nothing(data):
+    options = ("--scenes", 2, "--views", 1, "--elevation", 8, 20)
+    for folder, more in (("bare", ()), ("walled", ("--wall",)), ("walled_again", ("--wall",))):
+        result = generate(data, data / folder, *options, *more)
+        assert result.exit_code == 0, result.output
+    assert bytes_of(data / "walled") == bytes_of(data / "walled_again")
+    scenes = zip(find_scenes(data / "bare"), find_scenes(data / "walled"), strict=True)
+    for bare, walled in scenes:
+        poses = [[each.T_world_object for each in scene.objects] for scene in (bare, walled)]
+        assert np.array_equal(*poses)
+        before, frame = bare.view(0), walled.view(0)
+        assert (before.segmap == frame.segmap).all(), "it hides no object"
+        new = frame.valid & ~(np.abs(frame.depth - before.depth) < 1e-3)
+        assert new.mean() > 0.2 and (frame.segmap[new] == 0).all()
+        points = transform_points(frame.T_world_cam, frame.points[new].astype(np.float64))
+        spread = np.linalg.svd(points - points.mean(axis=0), full_matrices=False)
+        assert spread[1][2] < 1e-3 * spread[1][1], "one plane"
+        assert abs(spread[2][2] @ [0, 0, 1]) < 1e-3, "that stands upright"
+
+
+@pytest.mark.parametrize(
+    ("options", "told"),
+    [
+        (("--bin", "--stack"), "exclude each other"),
+        (("--wall", "--bin"), "--wall takes --views 1"),
+        (("--wall", "--views", 2), "--wall takes --views 1"),
+    ],
+)
+def test_what_does_not_go_together_is_told(data, options, told):
+    result = generate(data, data / "both", *options)
+    assert result.exit_code == 2 and told in result.output
 
 
 def test_objects_lie_on_the_table(data, made):

@@ -16,8 +16,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from tabletop.bin import Bin
 from tabletop.camera import Camera
+from tabletop.furniture import Furniture
 from tabletop.models import Model
 from tabletop.settle import TABLE, Panel, Pose
 from tabletop.world import World, new_world
@@ -61,10 +61,10 @@ def render(
     look: Look,
     cameras: Sequence[Camera],
     size: tuple[int, int],
-    bin: Bin | None = None,
+    furniture: Furniture | None = None,
 ) -> list[Picture]:
     """A picture from each camera, `size` = (width, height). Object number i has the id i + 1;
-    table and bin are background."""
+    table and furniture are background."""
     with new_world() as world, tempfile.TemporaryDirectory() as textures:
         ids = {
             _add_object(world, model, pose, color, Path(textures) / f"{i}.bmp"): i + 1
@@ -73,8 +73,8 @@ def render(
             )
         }
         _show(world, TABLE, look.table_color)
-        for panel in bin.panels() if bin else ():
-            _show(world, panel, np.array(bin.color))
+        for panel in furniture.panels() if furniture else ():
+            _show(world, panel, np.array(furniture.color))
         return [_take(world, camera, look, ids, size) for camera in cameras]
 
 

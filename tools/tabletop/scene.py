@@ -24,12 +24,14 @@ from tabletop.check import (
     check_measured_scene,
     check_scene,
 )
+from tabletop.furniture import Furniture
 from tabletop.light import draw_light, relight
 from tabletop.models import Model, load_model
 from tabletop.render import NOTHING, Picture, draw_look, render
 from tabletop.settle import Pose, drop
 from tabletop.stack import stack
 from tabletop.stage import Stage, stage_of
+from tabletop.wall import draw_wall
 
 FEWEST, MOST = 3, 10
 MAX_DRAWS = 20
@@ -43,8 +45,8 @@ JPEG_QUALITY = 95
 class Plan:
     """What all scenes of a set share. `noise`: a key of `LIMITS`; `light`: one of `LIGHTS`;
     `size`: (width, height); `sensor`: one of `SENSOR_NAMES`, instead of noise; `stacked`: every
-    second object is dropped onto the one before it; `binned`: objects lie in a bin; `standpoint`:
-    where cameras stand."""
+    second object is dropped onto the one before it; `binned`: objects lie in a bin; `walled`: a
+    wall stands behind them, as the first camera sees them; `standpoint`: where cameras stand."""
 
     meshes: tuple[Path, ...]
     data_root: Path
@@ -58,6 +60,7 @@ class Plan:
     sensor: str = "none"
     stacked: bool = False
     binned: bool = False
+    walled: bool = False
     standpoint: Standpoint = field(default_factory=Standpoint)
 
 
@@ -86,7 +89,14 @@ def make_scene(plan: Plan, number: int, check: bool) -> list[Distance]:
     centers = [pose.apply(model.center[None])[0] for pose, model in zip(poses, models, strict=True)]
     center = np.mean(centers, axis=0)
     cameras = [draw_camera(center, plan.size, rng, plan.standpoint) for _ in range(plan.views)]
-    pictures = render(models, poses, look, cameras, plan.size, bin)
+    furniture: Furniture | None = bin
+    if plan.walled:
+        points = [
+            pose.apply(model.hull + model.center) for pose, model in zip(poses, models, strict=True)
+        ]
+        wall_rng = child_rng(plan.seed, "scene", number, "wall")
+        furniture = draw_wall(np.concatenate(points), cameras[0], wall_rng)
+    pictures = render(models, poses, look, cameras, plan.size, furniture)
     if plan.light == "varied":
         light_rng = child_rng(plan.seed, "scene", number, "light")
         light = draw_light(light_rng)
@@ -116,7 +126,14 @@ def make_scene(plan: Plan, number: int, check: bool) -> list[Distance]:
                 # The same materials in every view.
                 material_rng = child_rng(plan.seed, "scene", number, "materials")
                 stage = stage_of(
-                    models, poses, look.object_colors, camera, K, depth.shape, material_rng, bin
+                    models,
+                    poses,
+                    look.object_colors,
+                    camera,
+                    K,
+                    depth.shape,
+                    material_rng,
+                    furniture,
                 )
                 depth = measured_buffer(
                     plan.sensor, stage, child_rng(plan.seed, "scene", number, "sensor", i)

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from brrp_cli.dependencies import import_open3d
 from brrp_cli.depth_noise.view import View
 from brrp_cli.raycast import raycasting_scene
-from tabletop.bin import Bin
 from tabletop.camera import Camera
+from tabletop.furniture import Furniture
 from tabletop.models import Model
 from tabletop.settle import TABLE, Panel, Pose, rotation
 
@@ -135,7 +135,7 @@ def stage_of(
     K: NDArray[np.float64],
     shape: tuple[int, int],
     rng: np.random.Generator,
-    bin: Bin | None = None,
+    furniture: Furniture | None = None,
 ) -> Stage:
     """The stage of a tabletop scene; `rng` draws what the materials do to infrared light."""
     R = _FLIP @ camera.view[:3, :3]
@@ -148,9 +148,9 @@ def stage_of(
         )
     ]
     surfaces.append(_panel(TABLE, *_furniture(rng), R, t))
-    if bin is not None:
+    if furniture is not None:
         material = _furniture(rng)
-        surfaces += [_panel(panel, *material, R, t) for panel in bin.panels()]
+        surfaces += [_panel(panel, *material, R, t) for panel in furniture.panels()]
     return Stage(tuple(surfaces), K, shape)
 
 
