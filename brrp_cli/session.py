@@ -23,7 +23,7 @@ from brrp_cli.config.registration import TrialConfig
 from brrp_cli.config.segmentation import SegmentConfig
 from brrp_cli.config.tracking import SharpenConfig, TrackConfig
 from brrp_cli.errors import FrameError
-from brrp_cli.frames.frame import Frame
+from brrp_cli.frames.frame import BACKGROUND, Frame
 from brrp_cli.geometry import normalise
 from brrp_cli.mending.again import Again, Objects
 from brrp_cli.mending.mend import mend
@@ -41,6 +41,7 @@ from brrp_cli.tracking import (
     camera_motion,
     first_frame,
     follow,
+    not_tried,
     spread_out,
     unmoved,
     with_known,
@@ -180,7 +181,10 @@ class Reconstructor:
         objects = sorted([*result.objects, *kept], key=lambda item: item.object_id)
         result = replace(result, objects=objects)
         if mends:
-            result = self._mended(result, infer, aside, todo, followed.next_id)
+            fresh = aside
+            if self._last is not None and aside is not None:
+                fresh = not_tried(self._last, frame, aside, self._track)
+            result = self._mended(result, infer, fresh, todo, followed.next_id)
         result.seconds["tracking"] = seconds
         # Mending may have made anew what was kept.
         was = {item.object_id: item for item in kept}
@@ -192,8 +196,7 @@ class Reconstructor:
         newest = replace(result, objects=new, image=None)
         self._made = [(result.frame, newest), *left] if new else left
         next_id = max(followed.next_id, max(result.frame.object_ids) + 1)
-        left_out = frozenset() if aside is None else of_left_out(result.frame, aside)
-        self._last = Followed(result.frame, next_id, left_out)
+        self._last = _followed(result.frame, next_id, aside)
         return result
 
     def _mended(
@@ -301,3 +304,16 @@ class Reconstructor:
             return frame.with_masks(self._segmenter(frame, self._prompt, self._seed)), None
         segmap, aside = segment_and_aside(frame, self._seed, self._segmentation)
         return frame.with_masks(segmap), aside
+
+
+def _followed(frame: Frame, next_id: int, aside: NDArray[np.int64] | None) -> Followed:
+    """What to follow into the next frame; aside : (H, W) masks that were left out, 0 = none."""
+    if aside is None:
+        return Followed(frame, next_id)
+    strangers = np.where(frame.segmap == BACKGROUND, aside, BACKGROUND)
+    return Followed(
+        frame,
+        next_id,
+        of_left_out(frame, aside),
+        frame.with_masks(strangers) if strangers.any() else None,
+    )

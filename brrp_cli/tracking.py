@@ -24,12 +24,14 @@ class Followed:
     """A frame whose ids are those of the tracks.
 
     next_id : the first id that is free; left_out : ids of what is recognised in a mask that was
-    left out when masks were made, as what the image's border cuts is
+    left out when masks were made, as what the image's border cuts is; strangers : the frame with
+    those of these masks in which nothing is
     """
 
     frame: Frame
     next_id: int
     left_out: frozenset[int] = frozenset()
+    strangers: Frame | None = None
 
 
 def first_frame(frame: Frame) -> Followed:
@@ -63,6 +65,19 @@ def with_known(
     T_now_last = camera_motion(last.frame, frame, config)
     known = match(last.frame.with_masks(old), frame.with_masks(new), T_now_last, config)
     return frame.with_masks(np.where(np.isin(new, list(known)), new, frame.segmap))
+
+
+def not_tried(
+    last: Followed, frame: Frame, aside: NDArray[np.int64], config: TrackConfig
+) -> NDArray[np.int64]:
+    """Those of the masks that were left out of a frame, `aside` (H, W), 0 = none, that did not rest
+    since nothing was recognised in them."""
+    before = last.strangers
+    if before is None:
+        return aside
+    now = follow(Followed(before, max(before.object_ids) + 1), frame.with_masks(aside), config)
+    resting = unmoved(before, now.frame, config)
+    return np.where(np.isin(now.frame.segmap, list(resting)), BACKGROUND, aside)
 
 
 def unmoved(before: Frame, frame: Frame, config: TrackConfig) -> frozenset[int]:

@@ -9,6 +9,7 @@ import pytest
 from painted_scene import STRANGE, THINGS, photograph, write_things
 
 from brrp_cli import Reconstructor
+from brrp_cli.api import try_masks
 from brrp_cli.config.segmentation import LeftOutConfig, SegmentConfig
 from brrp_cli.errors import FrameError
 from brrp_cli.mending.strangers import of_left_out, without_strangers
@@ -82,11 +83,24 @@ def test_where_the_border_cuts_all_there_is_what_is_recognised_alone_is_an_objec
         session(unmasked(photograph({STRANGER: (*STRANGE, *BEYOND)})))
 
 
-def test_an_object_that_the_border_cuts_keeps_its_id_and_what_was_made_of_it(scene, session):
+def test_an_object_that_the_border_cuts_keeps_its_id_and_what_was_made_of_it(
+    scene, session, monkeypatch
+):
+    tried = []
+
+    def counted(frame, masks, *args, **kwargs):
+        tried.append(len(masks))
+        return try_masks(frame, masks, *args, **kwargs)
+
+    monkeypatch.setattr("brrp_cli.session.try_masks", counted)
     with Reconstructor(
         session._prior, retriever="appearance", workers=1, segmentation=SEGMENTATION, track=True
     ) as tracking:
-        first, second = tracking(unmasked(scene)), tracking(unmasked(scene))
+        first = tracking(unmasked(scene))
+        assert tried
+        tried.clear()
+        second = tracking(unmasked(scene))
+    assert not tried, "what rests is not tried again, the stranger neither"
     assert len(first.objects) == 2
     assert [i.object_id for i in second.objects] == [i.object_id for i in first.objects]
     assert all(
