@@ -36,6 +36,7 @@ class WallConfig:
     cell : metres of a plane's grid; low : metres within which what lies over a cell touches it;
     clear : metres from both planes from which on something is a thing; more : part of its cells by
     which the table is touched more
+    border : part of the image's border that it fills, from which on no mask is looked for there
     """
 
     square: float = between(20.0, 0.0, 90.0)
@@ -46,6 +47,7 @@ class WallConfig:
     low: float = 0.03
     clear: float = 0.02
     more: float = share(0.1)
+    border: float = share(0.1)
 
 
 @dataclass(frozen=True)

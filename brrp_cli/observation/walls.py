@@ -75,3 +75,10 @@ def touching(plane: Plane, things: Array, config: WallConfig) -> float:
     lowest = np.full(number.max() + 1, np.inf)
     np.minimum.at(lowest, number.ravel(), plane.signed_distance(things))
     return float((lowest < config.low).mean())
+
+
+def behind_wall(points: Array, wall: Plane, near: float) -> NDArray[np.bool_]:
+    """(...,) which of points (..., 3), metres, camera frame, are a wall or lie behind it: nearer to
+    it than `near` metres, which beyond a depth of one grow with its square."""
+    far = np.maximum(points[..., 2], 1.0) ** 2
+    return np.asarray(wall.signed_distance(points) < near * far)

@@ -8,10 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brrp_cli.config.segmentation import SegmentConfig
+from brrp_cli.observation.walls import behind_wall
 from brrp_cli.segmentation.beyond_image import beyond_image
 from brrp_cli.segmentation.bins import find_bins
 from brrp_cli.segmentation.hulls import beyond_hull
 from brrp_cli.segmentation.table_plane import Table, find_table
+
+BORDER = 16  # pixels: its width
 
 
 @dataclass(frozen=True)
@@ -45,7 +48,19 @@ def see_table(
     flat = (np.abs(height) < config.table.tolerance) & (beside <= 0)
     beyond = beyond_image(plan, flat, config.table)
     if beyond is not None:
-        beside = np.minimum(beside, beyond_hull(beyond, plan.reshape(-1, 2)).reshape(beside.shape))
-    if table.backs:
-        beside[table.ends_at(points, config.table.wall.near)] = np.inf
+        outside = beside > 0
+        beside[outside] = np.minimum(beside[outside], beyond_hull(beyond, plan[outside]))
+    wall = config.table.wall
+    for back in table.backs:
+        behind, past = (behind_wall(points, back, near) for near in (wall.near, -wall.near))
+        # What ends within the image is a box, or a thing behind the table.
+        if _of_border(behind & ~past, valid) >= wall.border:
+            beside[behind] = np.inf
     return SeenTable(table, plan, table.above_floors(plan, height), beside)
+
+
+def _of_border(mask: NDArray[np.bool_], valid: NDArray[np.bool_]) -> float:
+    """The share of the pixels with depth along the image's border that a mask (H, W) holds."""
+    border = valid.copy()
+    border[BORDER:-BORDER, BORDER:-BORDER] = False
+    return float(mask[border].mean()) if border.any() else 0.0

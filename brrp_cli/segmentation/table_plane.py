@@ -26,7 +26,7 @@ class Table:
     axes : (2, 3) float64, unit, spanning the plane: plan coordinates are points @ axes.T
     hull : (m, 3) float64: plan points p with hull[:, :2] @ p + hull[:, 2] <= 0 lie on the table
     bins : on the table; they count as part of it
-    backs : walls behind it, turned to the camera
+    backs : upright planes behind it, turned to the camera
     """
 
     plane: Plane
@@ -61,15 +61,6 @@ class Table:
         for each in self.bins:
             above.reshape(-1)[in_hull(each.outside, flat, 0.0)] -= each.floor
         return above
-
-    def ends_at(self, points: NDArray[np.floating], near: float) -> NDArray[np.bool_]:
-        """(...,) which of points (..., 3), metres, camera frame, are a wall behind the table, or
-        behind that: nearer to it than `near` metres for a depth of one, which grow with its
-        square."""
-        behind = np.zeros(points.shape[:-1], dtype=bool)
-        for back in self.backs:
-            behind |= back.signed_distance(points) < near * np.maximum(points[..., 2], 1.0) ** 2
-        return behind
 
     def walls(
         self, plan: NDArray[np.floating], height: NDArray[np.floating], config: BinsConfig

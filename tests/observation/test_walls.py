@@ -17,7 +17,7 @@ from brrp_cli.frames.frame import Frame
 from brrp_cli.geometry import backproject, transform_points
 from brrp_cli.observation.ray_samples import scene_plane
 from brrp_cli.observation.support_plane import Plane
-from brrp_cli.observation.walls import is_wall, touching
+from brrp_cli.observation.walls import behind_wall, is_wall, touching
 from brrp_cli.raycast import look
 from brrp_cli.segmentation.segment import segment
 from brrp_cli.segmentation.table_plane import find_table
@@ -96,16 +96,25 @@ def test_masks_are_those_of_the_things_and_the_wall_has_none():
     assert agrees(SegmentConfig(table=blind)) < 0.7
 
 
-def test_the_table_ends_at_the_wall():
-    frame = photograph(THINGS, [TABLE, wall()])
+def test_what_is_near_a_wall_or_behind_it_is_no_thing():
+    wall = Plane(np.array([0.0, 0.0, -1.0]), 2.0)
+    depths = np.array([1.9, 1.95, 1.96, 2.0, 2.3])
+    points = np.stack([0 * depths, 0 * depths, depths], axis=-1)
+    assert behind_wall(points, wall, 0.012).tolist() == [False, False, True, True, True]
+
+
+def test_a_box_that_ends_the_table_has_a_mask_all_the_same():
+    """Its front looks like a wall in all but that it ends within the image."""
+    last = trimesh.creation.box((0.05, 0.2, 0.16)).apply_translation([-0.12, 0, 0.08])
+    last.apply_transform(trimesh.transformations.rotation_matrix(YAW, [0, 0, 1]))
+    ends = trimesh.creation.box((0.8, 1.5, 0.02)).apply_translation([0.28, 0, -0.01])
+    ends.apply_transform(trimesh.transformations.rotation_matrix(YAW, [0, 0, 1]))
+    frame = photograph([last, *THINGS], [ends], elevation=0.5)
     table = find_table(seen(frame), 0, None, SegmentConfig().table)
-    (back,) = table.backs
-    depth = np.linalg.norm(back.normal * back.offset)
-    on_wall = -back.offset * back.normal
-    near = SegmentConfig().table.wall.near
-    assert depth < 1.2
-    assert table.ends_at(np.array([on_wall, 1.1 * on_wall]), near).all()
-    assert not table.ends_at(np.array([on_wall + 0.05 * back.normal]), near).any()
+    assert len(table.backs) == 1
+    found, mask = segment(frame), frame.segmap == 1
+    ids, counts = np.unique(found[mask], return_counts=True)
+    assert ids[np.argmax(counts)] > 0 and counts.max() > 0.8 * mask.sum()
 
 
 def test_the_side_of_a_large_box_is_no_wall():
