@@ -17,6 +17,7 @@ from brrp_cli.config.tracking import SharpenConfig, TrackConfig
 from brrp_cli.frames.frame import BACKGROUND, Frame
 from brrp_cli.frames.projection import at_pixels, depth_behind
 from brrp_cli.geometry import transform_points
+from brrp_cli.segmentation.other_masks import with_left_out
 
 
 @dataclass(frozen=True)
@@ -60,11 +61,12 @@ def with_known(
     if not last.left_out:
         return frame
     old = np.where(np.isin(last.frame.segmap, list(last.left_out)), last.frame.segmap, BACKGROUND)
-    first = int(frame.segmap.max())
-    new = np.where((aside != BACKGROUND) & (frame.segmap == BACKGROUND), aside + first, BACKGROUND)
+    both, ids = with_left_out(frame, aside)
+    new = frame.with_masks(np.where(np.isin(both.segmap, ids), both.segmap, BACKGROUND))
     T_now_last = camera_motion(last.frame, frame, config)
-    known = match(last.frame.with_masks(old), frame.with_masks(new), T_now_last, config)
-    return frame.with_masks(np.where(np.isin(new, list(known)), new, frame.segmap))
+    known = match(last.frame.with_masks(old), new, T_now_last, config)
+    here = np.isin(both.segmap, list(known))
+    return frame.with_masks(np.where(here, both.segmap, frame.segmap))
 
 
 def not_tried(

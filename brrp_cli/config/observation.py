@@ -36,7 +36,8 @@ class WallConfig:
     cell : metres of a plane's grid; low : metres within which what lies over a cell touches it;
     clear : metres from both planes from which on something is a thing; more : part of its cells by
     which the table is touched more
-    border : part of the image's border that it fills, from which on no mask is looked for there
+    border : part of the image's border, `border_width` pixels of it, that it fills, from which on
+    no mask is looked for there
     """
 
     square: float = between(20.0, 0.0, 90.0)
@@ -48,6 +49,7 @@ class WallConfig:
     clear: float = 0.02
     more: float = share(0.1)
     border: float = share(0.1)
+    border_width: int = between(16, 1, 1000)
 
 
 @dataclass(frozen=True)

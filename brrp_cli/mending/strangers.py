@@ -41,7 +41,7 @@ def without_strangers(
         return result
     segmap = np.where(np.isin(frame.segmap, strangers), BACKGROUND, frame.segmap)
     if not segmap.any():
-        raise nothing_stands(frame, config)
+        raise nothing_stands(frame)
     objects = [each for each in result.objects if each.object_id not in strangers]
     return replace(result, frame=frame.with_masks(segmap), objects=objects)
 

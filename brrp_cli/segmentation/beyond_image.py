@@ -5,11 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from brrp_cli.config.segmentation import TableConfig
+from brrp_cli.config.table import TableConfig
 from brrp_cli.segmentation.hulls import convex_hull
-
-STEP = 12  # pixels over which the way out of the image is read
-EDGE = 2  # pixels: the last ones before depth ends are not trusted
 
 
 def beyond_image(
@@ -27,11 +24,13 @@ def beyond_image(
         # A stereo camera sees nothing along one side of its image.
         first = np.argmax(seen, axis=1)
         rows = np.flatnonzero(seen.any(axis=1) & (first < config.blind * at.shape[1]))
-        columns = first[rows] + EDGE
-        here = (columns + STEP < at.shape[1]) & on[rows, np.minimum(columns, at.shape[1] - 1)]
+        columns = first[rows] + config.edge
+        here = (columns + config.step < at.shape[1]) & on[
+            rows, np.minimum(columns, at.shape[1] - 1)
+        ]
         rows, columns = rows[here], columns[here]
-        there = on[rows, columns + STEP]
-        border, inner = at[rows, columns][there], at[rows, columns + STEP][there]
+        there = on[rows, columns + config.step]
+        border, inner = at[rows, columns][there], at[rows, columns + config.step][there]
         way = border - inner
         far = np.maximum(np.linalg.norm(way, axis=1, keepdims=True), 1e-9)
         corners += [border, border + config.beyond * way / far]

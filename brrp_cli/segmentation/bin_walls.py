@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from brrp_cli.config.segmentation import BinsConfig, SegmentConfig
+from brrp_cli.config.segmentation import SegmentConfig
+from brrp_cli.config.table import BinsConfig
 from brrp_cli.config.tables import changed
 from brrp_cli.errors import FrameError
 from brrp_cli.frames.frame import BACKGROUND, Frame
@@ -25,8 +26,6 @@ log = logging.getLogger(__name__)
 Array = NDArray[np.float64]
 # Corners (8, 3) of a convex solid, metres, camera frame.
 Wall = Array
-# Of what a bin's walls show, from which on it is an object itself.
-MASKED = 0.5
 
 
 def bin_walls(frame: Frame, seed: int, config: SegmentConfig) -> list[list[Wall]]:
@@ -51,7 +50,7 @@ def bin_walls(frame: Frame, seed: int, config: SegmentConfig) -> list[list[Wall]
         walls[there] = Table(table.plane, table.axes, table.hull, (each,)).walls(
             plan[there], height[there] - each.floor, config.bins
         )
-        if not walls.any() or masked[walls].mean() < MASKED:
+        if not walls.any() or masked[walls].mean() < config.bins.masked:
             found.append(walls_of(each, table, plan[there], height[there], config.bins))
     return found
 

@@ -13,7 +13,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from brrp_cli.config.segmentation import BinsConfig
+from brrp_cli.config.table import BinsConfig
 from brrp_cli.dependencies import import_library
 from brrp_cli.segmentation.hulls import convex_hull, in_hull
 from brrp_cli.segmentation.rectangles import rectangles

@@ -51,7 +51,7 @@ def other_masks(
     own = config.regroup
     both, left_out = frame, list[int]()
     if aside is not None:
-        both, left_out = _with_left_out(frame, aside)
+        both, left_out = with_left_out(frame, aside)
     groups = [frozenset([i]) for i in left_out] + unions(both, [*ids, *left_out], own)
     found = [
         OtherMask(np.isin(both.segmap, list(group)), group.difference(left_out)) for group in groups
@@ -116,7 +116,7 @@ def painted(
     return found, named
 
 
-def _with_left_out(frame: Frame, aside: NDArray[np.integer]) -> tuple[Frame, list[int]]:
+def with_left_out(frame: Frame, aside: NDArray[np.integer]) -> tuple[Frame, list[int]]:
     """The frame with what was left out as masks where it has none, and their ids."""
     last = int(frame.segmap.max())
     here = (aside != BACKGROUND) & (frame.segmap == BACKGROUND)

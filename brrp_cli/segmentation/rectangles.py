@@ -8,7 +8,7 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
-from brrp_cli.config.segmentation import BinsConfig
+from brrp_cli.config.table import BinsConfig
 
 
 def rectangles(points: NDArray[np.float64], config: BinsConfig) -> Iterator[NDArray[np.float64]]:

@@ -14,8 +14,6 @@ from brrp_cli.segmentation.bins import find_bins
 from brrp_cli.segmentation.hulls import beyond_hull
 from brrp_cli.segmentation.table_plane import Table, find_table
 
-BORDER = 16  # pixels: its width
-
 
 @dataclass(frozen=True)
 class SeenTable:
@@ -54,13 +52,14 @@ def see_table(
     for back in table.backs:
         behind, past = (behind_wall(points, back, near) for near in (wall.near, -wall.near))
         # What ends within the image is a box, or a thing behind the table.
-        if _of_border(behind & ~past, valid) >= wall.border:
+        if _of_border(behind & ~past, valid, wall.border_width) >= wall.border:
             beside[behind] = np.inf
     return SeenTable(table, plan, table.above_floors(plan, height), beside)
 
 
-def _of_border(mask: NDArray[np.bool_], valid: NDArray[np.bool_]) -> float:
-    """The share of the pixels with depth along the image's border that a mask (H, W) holds."""
+def _of_border(mask: NDArray[np.bool_], valid: NDArray[np.bool_], width: int) -> float:
+    """The share of the pixels with depth along the image's border, `width` pixels of it, that a
+    mask (H, W) holds."""
     border = valid.copy()
-    border[BORDER:-BORDER, BORDER:-BORDER] = False
+    border[width:-width, width:-width] = False
     return float(mask[border].mean()) if border.any() else 0.0

@@ -30,6 +30,11 @@ from brrp_cli.segmentation.table_plane import Table
 
 log = logging.getLogger(__name__)
 
+LEFT_OUT_ALONE = (
+    "only what the image's border cuts, what seems to stand nowhere, or smears of depth,"
+    " and no stored object in it"
+)
+
 
 def segment(
     frame: Frame, seed: int = 0, config: SegmentConfig | None = None, *, keep_all: bool = False
@@ -45,8 +50,9 @@ def segment(
     Errors: FrameError if there is no table or nothing stands on it.
     """
     segmap, aside = segment_and_aside(frame, seed, config, keep_all=keep_all)
+    # Where all masks are left out, they come as masks, too.
     if (aside[segmap != BACKGROUND] != BACKGROUND).all():
-        raise nothing_stands(frame, config or SegmentConfig())
+        raise nothing_stands(frame)
     return segmap
 
 
@@ -85,13 +91,13 @@ def segment_and_aside(
     return _numbered(segmap if segmap.any() else aside, frame, config), aside
 
 
-def nothing_stands(frame: Frame, config: SegmentConfig) -> FrameError:
-    """The error where no mask is left."""
+def nothing_stands(frame: Frame, found: str = LEFT_OUT_ALONE) -> FrameError:
+    """The error where no mask is left; found : what there is instead."""
     return FrameError(
         "Nothing stands on the table",
         where=frame.source,
         expected="objects that rise above their support plane",
-        found=f"none that shows {config.min_area * 1e4:g} cm^2 of itself",
+        found=found,
         fix="check the unit of depth (--depth-scale), move the camera nearer, keep what the image's"
         " border cuts (--all), or pass masks with --masks",
     )
@@ -170,7 +176,7 @@ def _numbered(segmap: NDArray[np.int64], frame: Frame, config: SegmentConfig) ->
         int(i): float(columns[segmap == i].mean()) for i in np.unique(segmap) if i != BACKGROUND
     }
     if not middles:
-        raise nothing_stands(frame, config)
+        raise nothing_stands(frame, f"none that shows {config.min_area * 1e4:g} cm^2 of itself")
     numbered = np.zeros_like(segmap)
     for number, old in enumerate(sorted(middles, key=lambda i: middles[i]), start=1):
         numbered[segmap == old] = number

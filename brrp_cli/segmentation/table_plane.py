@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brrp_cli.config.observation import WallConfig
-from brrp_cli.config.segmentation import BinsConfig, TableConfig
+from brrp_cli.config.table import BinsConfig, TableConfig
 from brrp_cli.dependencies import import_library
 from brrp_cli.errors import FrameError
 from brrp_cli.observation.support_plane import Plane, largest_plane
@@ -158,6 +158,7 @@ def _walls_and_rest(
         for plane, _ in planes
     ]
     rest = [pair for pair, wall in zip(planes, walls, strict=True) if not wall]
+    # In a niche each of three could be the wall of the next.
     if not rest:
         return (), planes
     return tuple(plane for (plane, _), wall in zip(planes, walls, strict=True) if wall), rest

@@ -25,13 +25,19 @@ SEGMENTATION = SegmentConfig(left_out=replace(LeftOutConfig(), tell=300))
 
 
 @pytest.fixture(scope="module")
-def session(tmp_path_factory):
+def given(tmp_path_factory):
     folder = tmp_path_factory.mktemp("cut")
     parameters = BuildParameters(samples=400, surface_points=400, dense_points=4_000)
     build_prior(write_things(folder / "meshes"), folder / "prior", parameters, workers=1)
-    with Reconstructor(
-        open_prior(folder / "prior"), retriever="appearance", workers=1, segmentation=SEGMENTATION
-    ) as session:
+    prior = open_prior(folder / "prior")
+    return {
+        "prior": prior, "retriever": "appearance", "workers": 1, "segmentation": SEGMENTATION
+    }  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def session(given):
+    with Reconstructor(**given) as session:
         yield session
 
 
@@ -79,12 +85,12 @@ def test_a_stored_object_that_the_border_cuts_is_found_and_a_stranger_is_not(sce
 def test_where_the_border_cuts_all_there_is_what_is_recognised_alone_is_an_object(session):
     cut = photograph({CUT: (*THINGS["blue_box"], *AT_THE_BORDER)})
     assert names(session(unmasked(cut))) == ["blue_box"]
-    with pytest.raises(FrameError, match="Nothing stands on the table"):
+    with pytest.raises(FrameError, match=r"only what the image's border cuts.*no stored object"):
         session(unmasked(photograph({STRANGER: (*STRANGE, *BEYOND)})))
 
 
 def test_an_object_that_the_border_cuts_keeps_its_id_and_what_was_made_of_it(
-    scene, session, monkeypatch
+    scene, given, monkeypatch
 ):
     tried = []
 
@@ -93,9 +99,7 @@ def test_an_object_that_the_border_cuts_keeps_its_id_and_what_was_made_of_it(
         return try_masks(frame, masks, *args, **kwargs)
 
     monkeypatch.setattr("brrp_cli.session.try_masks", counted)
-    with Reconstructor(
-        session._prior, retriever="appearance", workers=1, segmentation=SEGMENTATION, track=True
-    ) as tracking:
+    with Reconstructor(**given, track=True) as tracking:
         first = tracking(unmasked(scene))
         assert tried
         tried.clear()

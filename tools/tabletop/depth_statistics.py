@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from brrp_cli.config.segmentation import TableConfig
+from brrp_cli.config.table import TableConfig
 from brrp_cli.geometry import backproject
 from brrp_cli.observation.support_plane import largest_plane
 from brrp_cli.segmentation.table_plane import Table, find_table

@@ -1,0 +1,103 @@
+"""The table of a frame without masks, and bins on it. Lengths are metres."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from brrp_cli.config.observation import WallConfig
+from brrp_cli.config.ranges import between, share
+
+
+@dataclass(frozen=True)
+class TableConfig:
+    """The table's plane and its extent.
+
+    points : so many are drawn, and of those ransac_points for RANSAC; iterations : of it;
+    tolerance : metres of its inliers; min_points : of them, at least
+    candidates : planes that are looked for; least : part of the points that a plane holds
+    parallel : degrees between the table and a floor; height : metres of the table above a floor;
+    of_floor : points of the table, as a part of the floor's
+    cell : metres of the grid on which the plane's points hang together
+    beyond : metres that the table goes on beyond the image's border, where it reaches it; blind :
+        part of the image along its border that may be without depth; edge : pixels, the last ones
+        before that, which are not trusted; step : pixels over which the way out of it is read
+    wall : which of two planes that meet in a corner is none
+    """
+
+    points: int = 40_000
+    ransac_points: int = 2_000
+    min_points: int = 100
+    iterations: int = 500
+    tolerance: float = 0.01
+    candidates: int = 3
+    least: float = share(0.05)
+    parallel: float = between(10.0, 0.0, 90.0)
+    height: float = 0.2
+    of_floor: float = share(0.25)
+    cell: float = 0.02
+    beyond: float = 0.2
+    blind: float = share(0.16)
+    edge: int = between(2, 0, 64)
+    step: int = between(12, 1, 64)
+    wall: WallConfig = field(default_factory=WallConfig)
+
+
+@dataclass(frozen=True)
+class BinsConfig:
+    """Bins, totes and trays: walls of one height around a floor. Lengths are metres.
+
+    points : about so many are looked at, at least; widest : on a larger table none is looked for
+    cell : of the plan's grid; step : of the heights of rims that are tried, from `least_height` to
+    `most_height` above the table; band : what is that far above or below may be of the same rim;
+    uneven : how far a rim may be above or below its own median
+    gap : cells; twice as many may be missing in a rim; least_rim : metres squared of it
+    complete : part of the outline, as far as the image shows it, that is rim; shown : part of the
+    outline that the image shows; hollow : part of what it encloses that is lower
+    area : that it encloses, metres squared: more than large bowls and pans do; rectangle : the same
+    of a rectangle; corners : part of it that the hull of the rim's cells fills; turn : radians
+    between the directions in which sides of rectangles are looked for; sides : coordinates that are
+    tried in each, `apart` metres or more from one another
+    low : what rises less may be floor; floor_seen : part of what it encloses that the hull of the
+    floor makes up, or a heap hides it and the floor is taken to reach `wall` metres from the rim;
+    least_floor : metres squared that tell how high the floor is
+    lies : what rises more over the floor lies in it; filled : metres squared of that, or the bin is
+    empty, and a thing itself
+    beside : how far beside the seen table a bin may reach; bled : how far depth bleeds beside its
+    walls; thick : how far within the rim they are seen at its height; lean : sine by which they do
+    over : what rises so far over the rim is an object; masked : part of what is seen of the walls
+    that has a mask, from which on the bin is an object itself
+    board : thickness of walls that are made solid
+    """
+
+    points: int = 100_000
+    widest: float = 4.0
+    cell: float = 0.01
+    step: float = 0.02
+    least_height: float = 0.04
+    most_height: float = 0.5
+    band: float = 0.02
+    uneven: float = 0.01
+    gap: int = between(2, 1, 16)
+    least_rim: float = 0.003
+    complete: float = share(0.75)
+    shown: float = share(0.5)
+    hollow: float = share(0.5)
+    area: float = 0.08
+    rectangle: float = 0.05
+    corners: float = share(0.93)
+    turn: float = 0.035
+    sides: int = between(4, 2, 16)
+    apart: float = 0.04
+    low: float = 0.03
+    floor_seen: float = share(0.6)
+    wall: float = 0.02
+    least_floor: float = 0.002
+    lies: float = 0.012
+    filled: float = 0.0004
+    beside: float = 0.1
+    bled: float = 0.01
+    thick: float = 0.03
+    lean: float = 0.14
+    over: float = 0.015
+    masked: float = share(0.5)
+    board: float = 0.01

@@ -1,0 +1,127 @@
+"""Scenes in a bin, before a wall, and on one another."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+import trimesh
+
+pytest.importorskip("pybullet")
+
+from made_scenes import bytes_of, generate, write_box, write_two
+from tabletop.bin import draw_bin
+from tabletop.models import find_meshes, load_model
+from tabletop.settle import rotation
+from tabletop.stack import stack
+
+from brrp_cli.geometry import transform_points
+from brrp_cli.ground_truth.scenes import find_scenes, true_mesh
+from brrp_cli.seeds import child_rng
+
+
+@pytest.fixture(scope="module")
+def data(tmp_path_factory):
+    return write_two(tmp_path_factory.mktemp("data"))
+
+
+def test_objects_lie_in_a_bin_that_is_background(data):
+    options = ("--scenes", 2, "--views", 1, "--elevation", 60, 80, "--bin")
+    for folder in ("binned", "binned_again"):
+        result = generate(data, data / folder, *options)
+        assert result.exit_code == 0, result.output
+    assert bytes_of(data / "binned") == bytes_of(data / "binned_again")
+    for number, scene in enumerate(find_scenes(data / "binned")):
+        box = draw_bin(child_rng(0, "scene", number, "bin"))
+        floor, walls = box.panels()[0], box.panels()[1:]
+        lowest = [true_mesh(o, data).bounds[0, 2] for o in scene.objects]
+        assert min(lowest) == pytest.approx(box.thickness, abs=0.002)
+        turned = rotation(floor.orientation)
+        for each in scene.objects:
+            inside = np.abs(true_mesh(each, data).vertices @ turned)[:, :2]
+            assert (inside.max(axis=0) < floor.half[:2] + box.height * np.tan(box.lean)).all()
+        frame = scene.view(0)
+        points = transform_points(frame.T_world_cam, frame.points[frame.valid].astype(np.float64))
+        on_wall = np.zeros(len(points), bool)
+        for wall in walls:
+            local = np.abs((points - wall.position) @ rotation(wall.orientation))
+            on_wall |= (local < wall.half + 1e-3).all(axis=1)
+        assert on_wall.sum() > 300
+        assert (frame.segmap[frame.valid][on_wall & (points[:, 2] > 0.02)] == 0).mean() > 0.97
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_bins_walls_stand_around_its_floor(seed):
+    box = draw_bin(np.random.default_rng(seed))
+    floor, *walls = box.panels()
+    assert floor.position[2] - floor.half[2] == pytest.approx(0)
+    for wall in walls:
+        up = rotation(wall.orientation)[:, 2]
+        assert np.arccos(up[2]) == pytest.approx(box.lean, abs=1e-6)
+        assert up[:2] @ wall.position[:2] >= -1e-9, "outwards"
+        foot = wall.position - up * wall.half[2]
+        assert foot[2] == pytest.approx(0, abs=1e-9)
+    spans = {round(float(np.linalg.norm(wall.position[:2])), 6) for wall in walls}
+    assert len(spans) == 2
+
+
+def test_a_wall_stands_behind_what_the_camera_sees_and_moves_nothing(data):
+    options = ("--scenes", 2, "--views", 1, "--elevation", 8, 20)
+    for folder, more in (("bare", ()), ("walled", ("--wall",)), ("walled_again", ("--wall",))):
+        result = generate(data, data / folder, *options, *more)
+        assert result.exit_code == 0, result.output
+    assert bytes_of(data / "walled") == bytes_of(data / "walled_again")
+    scenes = zip(find_scenes(data / "bare"), find_scenes(data / "walled"), strict=True)
+    for bare, walled in scenes:
+        poses = [[each.T_world_object for each in scene.objects] for scene in (bare, walled)]
+        assert np.array_equal(*poses)
+        before, frame = bare.view(0), walled.view(0)
+        assert (before.segmap == frame.segmap).all(), "it hides no object"
+        new = frame.valid & ~(np.abs(frame.depth - before.depth) < 1e-3)
+        assert new.mean() > 0.2 and (frame.segmap[new] == 0).all()
+        points = transform_points(frame.T_world_cam, frame.points[new].astype(np.float64))
+        spread = np.linalg.svd(points - points.mean(axis=0), full_matrices=False)
+        assert spread[1][2] < 1e-3 * spread[1][1], "one plane"
+        assert abs(spread[2][2] @ [0, 0, 1]) < 1e-3, "that stands upright"
+
+
+@pytest.mark.parametrize(
+    ("options", "told"),
+    [
+        (("--bin", "--stack"), "exclude each other"),
+        (("--wall", "--bin"), "--wall takes --views 1"),
+        (("--wall", "--views", 2), "--wall takes --views 1"),
+    ],
+)
+def test_what_does_not_go_together_is_told(data, options, told):
+    result = generate(data, data / "both", *options)
+    assert result.exit_code == 2 and told in result.output
+
+
+def test_stacked_objects_rest_on_and_in_one_another(data):
+    write_box(data / "stacks", "003_brick", (0.2, 0.2, 0.06), (0, 0, 0), (0, 255, 0))
+    outside = trimesh.creation.box((0.24, 0.24, 0.1))
+    tub = outside.difference(trimesh.creation.box((0.2, 0.2, 0.1)).apply_translation((0, 0, 0.02)))
+    tub.export(data / "tub.obj")
+    (brick,) = find_meshes(data / "stacks")
+    small = load_model(find_meshes(data / "meshes")[0])
+    models = [load_model(brick), small, load_model(data / "tub.obj"), small]
+    poses = stack(models, np.random.default_rng(0))
+    assert all(pose is not None for pose in poses)
+    lowest = [
+        float(pose.apply(model.hull + model.center)[:, 2].min())
+        for pose, model in zip(poses, models, strict=True)
+    ]
+    assert np.allclose(lowest, [0, 0.06, 0, 0.02], atol=0.002)
+    again = stack(models, np.random.default_rng(0))
+    assert all(
+        np.array_equal(a.position, b.position) and np.array_equal(a.orientation, b.orientation)
+        for a, b in zip(poses, again, strict=True)
+    )
+
+
+def test_the_option_makes_stacked_scenes(data):
+    assert generate(data, data / "on", "--scenes", 1, "--views", 1, "--stack").exit_code == 0
+    entries = json.loads((data / "on" / "00000000" / "objects.json").read_text())
+    assert max(entry["position"][2] for entry in entries) > 0
