@@ -24,6 +24,8 @@ where it has one: can on can, jar in bowl. It draws other scenes than a set with
 scenes than a set without it.
 `--wall` puts a wall behind the objects, which is background, too. Depth and colours differ from a
 set without it.
+`--shelf` lets them stand in a compartment of a shelf, which is background, with cameras before it:
+`--elevation 5 30` sees in. It draws other scenes than a set without it.
 `--distance`, `--elevation` and `--roll` say where cameras stand: `--elevation 70 89` looks down,
 `--distance 0.3 0.5` is a camera at a wrist, which `--roll -180 180` turns about its line of sight.
 
@@ -92,6 +94,7 @@ def _size(_context: click.Context, _option: click.Parameter, value: str) -> tupl
 @click.option("--stack", "stacked", is_flag=True, help="Set objects on and into one another.")
 @click.option("--bin", "binned", is_flag=True, help="Drop objects into a bin.")
 @click.option("--wall", "walled", is_flag=True, help="Put a wall behind them.")
+@click.option("--shelf", "shelved", is_flag=True, help="Stand objects in a shelf.")
 @click.option("--size", default="640x480", show_default=True, callback=_size)
 @click.option(
     "--distance",
@@ -136,6 +139,7 @@ def main(
     stacked: bool,
     binned: bool,
     walled: bool,
+    shelved: bool,
     size: tuple[int, int],
     distance: tuple[float, float],
     elevation: tuple[float, float],
@@ -151,10 +155,10 @@ def main(
             raise click.UsageError(
                 "--noise and --sensor exclude each other: a sensor brings its own"
             )
-        if stacked and binned:
-            raise click.UsageError("--stack and --bin exclude each other")
-        if walled and (binned or views > 1):
-            raise click.UsageError("--wall takes --views 1, whose back it is, and no --bin")
+        if sum((stacked, binned, shelved)) > 1:
+            raise click.UsageError("--stack, --bin and --shelf exclude one another")
+        if walled and (binned or shelved or views > 1):
+            raise click.UsageError("--wall takes --views 1, whose back it is, no --bin or --shelf")
         if data_root is None:
             if meshes is None:
                 raise click.UsageError("name the meshes: --meshes, or --data-root with --check")
@@ -186,6 +190,7 @@ def main(
             stacked,
             binned,
             walled,
+            shelved,
             Standpoint(distance, elevation, roll),
         )
         _report(list(_make_all(plan, scenes, workers)), output)

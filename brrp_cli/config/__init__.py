@@ -117,7 +117,7 @@ PRESETS = {
     "default": Config(preset="default"),
     "paper": Config(
         preset="paper",
-        observation=ObservationConfig(floor=None, wall=None),
+        observation=ObservationConfig(floor=None, support=None),
         surface=SurfaceConfig(level=0.5, one_piece=False),
         hypotheses=None,
     ),

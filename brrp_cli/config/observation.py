@@ -28,28 +28,67 @@ class FloorConfig:
 
 @dataclass(frozen=True)
 class WallConfig:
-    """A wall behind the table, where it is the larger plane (observation/walls.py).
+    """Walls behind a table, and the sides and boards of a shelf about it (observation/walls.py).
 
-    square : degrees by which their angle may differ from a right one; of_wall : points of the table
-    as a part of the wall's, at least; in_front : part of each one's points, those nearer to it than
-    `near` metres, that lie in front of the other
-    cell : metres of a plane's grid; low : metres within which what lies over a cell touches it;
-    clear : metres from both planes from which on something is a thing; more : part of its cells by
-    which the table is touched more
-    border : part of the image's border, `border_width` pixels of it, that it fills, from which on
-    no mask is looked for there
+    square : degrees by which their angles may differ from right ones; near : metres from a plane of
+    its own points; in_front : part of the table's points that lies on one side of a wall
+    cell : metres of the grid along it; spans : part of the table's length that a wall goes along
+    border : part of the image's border, `border_width` pixels of it, that a wall fills which does
+    not go along so much
+    board_above : metres above the table of a board over it, at least; covers : part of the table
+    that it covers; board : from the upper face of it down to where no object reaches
+    thick : of walls and boards that are made solid
     """
 
     square: float = between(20.0, 0.0, 90.0)
-    of_wall: float = share(0.2)
-    in_front: float = share(0.9)
     near: float = 0.012
+    in_front: float = between(0.9, 0.5, 1.0)
     cell: float = 0.02
-    low: float = 0.03
-    clear: float = 0.02
-    more: float = share(0.1)
+    spans: float = share(0.7)
     border: float = share(0.1)
     border_width: int = between(16, 1, 1000)
+    board_above: float = 0.12
+    covers: float = share(0.6)
+    board: float = 0.03
+    thick: float = 0.01
+
+
+@dataclass(frozen=True)
+class SupportConfig:
+    """Which of a frame's large planes bears its things (observation/borne.py).
+
+    points : of the background and of the objects that are looked at, at most
+    candidates : planes that are looked for; least : part of the points that a plane holds;
+    of_largest : of the largest plane's points, as a part, that another one has, at least
+    patch : metres of the grid on which a plane's points hang together
+    through : points seen behind a patch, as a part of its own, at most; off : metres from it and
+    from its outline at which they are, and at which something is no part of it
+    across : metres from end to end of one that is no face of a thing, at least; turn : degrees by
+    which it is parallel or square to the usual one; apart : metres from that where it is parallel
+    cell : metres of its plan's grid; low : metres within which the lowest point over a cell stands
+    on it; high : metres up to which something belongs to what stands there
+    fewest : such cells of a plane that is not the usual one; times : of the cells, and of the
+    points there, of the usual one; beneath : the same where it lies beneath the usual one
+    up : by how much both count for more on what faces up in the image
+    """
+
+    points: int = 40_000
+    candidates: int = between(8, 1, 32)
+    least: float = share(0.03)
+    of_largest: float = share(0.1)
+    patch: float = 0.02
+    through: float = share(0.1)
+    off: float = 0.02
+    across: float = 0.35
+    turn: float = between(6.0, 0.0, 45.0)
+    apart: float = 0.12
+    cell: float = 0.02
+    low: float = 0.03
+    high: float = 0.5
+    fewest: int = 6
+    times: float = 1.1
+    beneath: float = 3.0
+    up: float = 0.5
 
 
 @dataclass(frozen=True)
@@ -63,7 +102,7 @@ class ObservationConfig:
         plane_tolerance : of its inliers; plane_iterations : of RANSAC, on plane_ransac_points
         drawn points at most; plane_min_points : that a plane needs
     floor : where the plane around the objects is another one; None: it is never
-    wall : where the largest plane is a wall; None: it is never
+    support : which of the large planes bears the objects; None: the largest
     below_draws : samples below the plane within `below_radius`, metres, of the object's middle
     free_cell, surface_cell : metres, of grids in which samples of one label are thinned
     """
@@ -78,7 +117,7 @@ class ObservationConfig:
     plane_ransac_points: int = 4_000
     plane_min_points: int = 100
     floor: FloorConfig | None = field(default_factory=FloorConfig)
-    wall: WallConfig | None = field(default_factory=WallConfig)
+    support: SupportConfig | None = field(default_factory=SupportConfig)
     below_draws: int = 50_000
     below_radius: float = 0.2
     free_cell: float = 0.015

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from brrp_cli.config.observation import WallConfig
+from brrp_cli.config.observation import SupportConfig, WallConfig
 from brrp_cli.config.ranges import between, share
 
 
@@ -14,14 +14,13 @@ class TableConfig:
 
     points : so many are drawn, and of those ransac_points for RANSAC; iterations : of it;
     tolerance : metres of its inliers; min_points : of them, at least
-    candidates : planes that are looked for; least : part of the points that a plane holds
     parallel : degrees between the table and a floor; height : metres of the table above a floor;
     of_floor : points of the table, as a part of the floor's
     cell : metres of the grid on which the plane's points hang together
     beyond : metres that the table goes on beyond the image's border, where it reaches it; blind :
         part of the image along its border that may be without depth; edge : pixels, the last ones
         before that, which are not trusted; step : pixels over which the way out of it is read
-    wall : which of two planes that meet in a corner is none
+    support : which plane is the table; wall : what shuts it off
     """
 
     points: int = 40_000
@@ -29,8 +28,6 @@ class TableConfig:
     min_points: int = 100
     iterations: int = 500
     tolerance: float = 0.01
-    candidates: int = 3
-    least: float = share(0.05)
     parallel: float = between(10.0, 0.0, 90.0)
     height: float = 0.2
     of_floor: float = share(0.25)
@@ -39,6 +36,7 @@ class TableConfig:
     blind: float = share(0.16)
     edge: int = between(2, 0, 64)
     step: int = between(12, 1, 64)
+    support: SupportConfig = field(default_factory=SupportConfig)
     wall: WallConfig = field(default_factory=WallConfig)
 
 

@@ -19,7 +19,8 @@ from brrp_cli.grasping.standing_around import standing_around
 from brrp_cli.observation.support_plane import Plane
 from brrp_cli.reconstruction import OccupancyPosterior, Reconstruction
 from brrp_cli.results.read import StoredResult
-from brrp_cli.segmentation.bin_walls import Wall, bin_walls, segmentation_of
+from brrp_cli.segmentation.bin_walls import Solid
+from brrp_cli.segmentation.furniture import furniture, segmentation_of
 
 Array = NDArray[np.float64]
 # Up in the image, where no table says it.
@@ -42,14 +43,15 @@ class GraspObject:
 class GraspScene:
     """objects : those that have a mesh; plane : the table, camera frame; without : why others have
     none, by id; loose : (n, 3) observed points of those, and of what stands around; surface : how
-    meshes were made; walls : corners (8, 3) of the walls of bins, convex, camera frame"""
+    meshes were made; walls : corners (k, 3), convex, of the walls of bins and of what shuts the
+    table off, camera frame"""
 
     objects: list[GraspObject]
     plane: Plane | None
     without: dict[int, str]
     loose: Array
     surface: SurfaceConfig
-    walls: Sequence[Wall] = ()
+    walls: Sequence[Solid] = ()
 
     @property
     def up(self) -> Array:
@@ -99,7 +101,7 @@ def _stored(stored: StoredResult, around: SurroundingsConfig) -> GraspScene:
     }
     plane, masks = stored.plane_cam, segmentation_of(stored.record["segmentation"])
     loose = _loose(stored.frame, plane, objects, without, around, masks)
-    walls = _walls(stored.frame, plane, stored.record["seed"], masks)
+    walls = furniture(stored.frame, plane, stored.record["seed"], masks).solids
     return GraspScene(objects, plane, without, loose, stored.surface_config, walls)
 
 
@@ -120,13 +122,8 @@ def _computed(result: Reconstruction, around: SurroundingsConfig) -> GraspScene:
     loose = _loose(result.frame, result.plane, objects, without, around, masks)
     table = result.configuration.get("surface", {})
     surface = changed(SurfaceConfig(), table, "the reconstruction", "surface.")
-    walls = _walls(result.frame, result.plane, result.seed, masks)
+    walls = furniture(result.frame, result.plane, result.seed, masks).solids
     return GraspScene(objects, result.plane, without, loose, surface, walls)
-
-
-def _walls(frame: Frame, plane: Plane | None, seed: int, masks: SegmentConfig) -> list[Wall]:
-    bins = [] if plane is None else bin_walls(frame, seed, masks)
-    return [wall for walls in bins for wall in walls]
 
 
 def _loose(

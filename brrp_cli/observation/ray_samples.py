@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 from brrp_cli.config import ObservationConfig
 from brrp_cli.frames.frame import BACKGROUND, Frame
 from brrp_cli.frames.last_frame import kept_for_last_frame
+from brrp_cli.observation.borne import supporting_plane
 from brrp_cli.observation.subsample import grid_subsample
 from brrp_cli.observation.support_plane import Plane, floor_beneath
-from brrp_cli.observation.walls import supporting_plane
 from brrp_cli.seeds import child_rng
 from brrp_cli.threads import in_threads
 

@@ -1,84 +1,111 @@
-"""Walls behind a table: of two planes that meet in a corner, things stand on one of them alone."""
+"""What shuts a table off: a wall behind it, the back, the sides and the upper board of a shelf."""
 
 from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from brrp_cli.config.observation import ObservationConfig, WallConfig
-from brrp_cli.geometry import lengths
-from brrp_cli.observation.support_plane import Plane, fit_plane, plane_frame
-from brrp_cli.seeds import child_seed
+from brrp_cli.config.observation import WallConfig
+from brrp_cli.geometry import normalise
+from brrp_cli.hulls import in_hull
+from brrp_cli.observation.patches import Patch, patch_of
 
 Array = NDArray[np.floating]
 
 
-def supporting_plane(
-    points: Array, things: Array, config: ObservationConfig, seed: int, toward: Array
-) -> Plane | None:
-    """The largest plane of the background, as `fit_plane` finds it, unless that is a wall; then the
-    one beneath it.
+@dataclass(frozen=True)
+class Wall:
+    """An upright plane at which a table ends.
 
-    points : (n, 3) of the background; things : (m, 3) of the objects; toward : (3,) the scene's
-    centre; metres, camera frame. None where no plane is found.
+    patch : what is seen of it; outside : whether the table lies behind it, as it does behind the
+    outer face of a shelf's side; spans : whether it goes along all of the table
     """
-    largest = fit_plane(points, config, seed, toward)
-    if largest is None or config.wall is None:
-        return largest
-    near = points[lengths(points - toward) < config.plane_radius]
-    rest = near[np.abs(largest.signed_distance(near)) >= config.plane_tolerance]
-    if len(rest) < config.wall.of_wall * (len(near) - len(rest)):
-        return largest
-    other = fit_plane(rest, config, child_seed(seed, "beneath a wall"), toward)
-    if other is None or not is_wall(largest, other, near, things, config.wall):
-        return largest
-    return other
+
+    patch: Patch
+    outside: bool
+    spans: bool
+
+    def holds(self, points: Array, near: float) -> NDArray[np.bool_]:
+        """(...,) which of points (..., 3), metres, camera frame, are the wall or lie behind it:
+        nearer to it than `near` metres, which beyond a depth of one grow with its square. Of one
+        that is seen from outside, those that are near alone."""
+        height = self.patch.plane.signed_distance(points)
+        far = near * np.maximum(points[..., 2], 1.0) ** 2
+        return np.asarray((np.abs(height) if self.outside else height) < far)
 
 
-def is_wall(
-    plane: Plane, table: Plane, background: Array, things: Array, config: WallConfig
-) -> bool:
-    """Whether a plane is a wall that rises behind a table.
+@dataclass(frozen=True)
+class Board:
+    """A board over a table. patch : the face that is seen; height : metres above the table's plane,
+    of its lower face"""
 
-    The two are square to each other, what is seen of each lies in front of the other, and things
-    touch the table more than the wall. So a box on a table is no wall: the table goes on behind
-    its sides.
+    patch: Patch
+    height: float
 
-    background : (n, 3) metres, camera frame, of both planes and of other things; things : (m, 3) of
-    what stands on one of them
+
+def walls_of(
+    table: Patch, patches: Sequence[Patch], points: Array, config: WallConfig
+) -> tuple[Wall, ...]:
+    """The upright ones of the patches that have all of the table on one side.
+
+    So a box on a table is no wall: the table goes on behind its sides.
+
+    points : (n, 3) metres, camera frame, of all of them and of other things
     """
-    if abs(plane.normal @ table.normal) > np.sin(np.radians(config.square)):
-        return False
-    above_wall, above_table = (each.signed_distance(background) for each in (plane, table))
-    wall = (np.abs(above_wall) < config.near) & (np.abs(above_table) >= config.near)
-    flat = (np.abs(above_table) < config.near) & (np.abs(above_wall) >= config.near)
-    if not wall.any() or flat.sum() < config.of_wall * wall.sum():
-        return False
-    in_front = (above_table[wall] > 0).mean(), (above_wall[flat] > 0).mean()
-    if min(in_front) < config.in_front:
-        return False
-    # The corner itself is near to both.
-    clear = (plane.signed_distance(things) > config.clear) & (
-        table.signed_distance(things) > config.clear
-    )
-    touched, touches = (touching(each, things[clear], config) for each in (plane, table))
-    return touches > touched + config.more
+    flat = _on(table, points, config.near)
+    found = []
+    for patch in patches:
+        if abs(patch.plane.normal @ table.plane.normal) > np.sin(np.radians(config.square)):
+            continue
+        off = patch.plane.signed_distance(flat)
+        # The corner itself is near to both.
+        clear = off[np.abs(off) >= config.near]
+        in_front = float((clear > 0).mean()) if len(clear) else 0.5
+        if 1 - config.in_front < in_front < config.in_front:
+            continue
+        wall = points[np.abs(patch.plane.signed_distance(points)) < config.near]
+        rises = wall[table.plane.signed_distance(wall) > config.near]
+        along = normalise(np.cross(table.plane.normal, patch.plane.normal))
+        spans = _covers(rises @ along, flat @ along, config.cell) >= config.spans
+        found.append(Wall(patch, in_front < 0.5, spans))
+    return tuple(found)
 
 
-def touching(plane: Plane, things: Array, config: WallConfig) -> float:
-    """The share of the cells of a plane that things (n, 3), metres, camera frame, lie over, which
-    come within `config.low` of it there; 0 without things."""
-    if not len(things):
-        return 0.0
-    cells = np.floor(things @ plane_frame(plane)[:2, :3].T / config.cell).astype(np.int64)
-    _, number = np.unique(cells, axis=0, return_inverse=True)
-    lowest = np.full(number.max() + 1, np.inf)
-    np.minimum.at(lowest, number.ravel(), plane.signed_distance(things))
-    return float((lowest < config.low).mean())
+def board_over(
+    table: Patch, patches: Sequence[Patch], points: Array, config: WallConfig
+) -> Board | None:
+    """The lowest of the patches that cover the table as the next board of a shelf does.
+
+    points : (n, 3) metres, camera frame, of all of them and of other things
+    """
+    flat = table.plan(_on(table, points, config.near))
+    found = []
+    for patch in patches:
+        alike = patch.plane.normal @ table.plane.normal
+        if patch is table or abs(alike) < np.cos(np.radians(config.square)):
+            continue
+        near = points[np.abs(patch.plane.signed_distance(points)) < config.near]
+        height = float(np.median(table.plane.signed_distance(near))) if len(near) else 0.0
+        if height < config.board_above:
+            continue
+        below = near - height * table.plane.normal
+        shadow = patch_of(table.plane, below, config.near, config.cell)
+        if shadow is not None and in_hull(shadow.hull, flat, 0.0).mean() >= config.covers:
+            found.append(Board(patch, height if alike < 0 else height - config.board))
+    return min(found, key=lambda board: board.height, default=None)
 
 
-def behind_wall(points: Array, wall: Plane, near: float) -> NDArray[np.bool_]:
-    """(...,) which of points (..., 3), metres, camera frame, are a wall or lie behind it: nearer to
-    it than `near` metres, which beyond a depth of one grow with its square."""
-    far = np.maximum(points[..., 2], 1.0) ** 2
-    return np.asarray(wall.signed_distance(points) < near * far)
+def _on(table: Patch, points: Array, near: float) -> Array:
+    flat = points[np.abs(table.plane.signed_distance(points)) < near]
+    return flat[in_hull(table.hull, table.plan(flat), 0.0)]
+
+
+def _covers(some: Array, others: Array, cell: float) -> float:
+    """The share of the cells from end to end of `others` (n,), metres, that hold some of (m,)."""
+    low, high = np.percentile(others, (1, 99))
+    count = max(int(np.ceil((high - low) / cell)), 1)
+    inside = some[(some >= low) & (some < high)]
+    return len(np.unique(((inside - low) / cell).astype(np.int64))) / count

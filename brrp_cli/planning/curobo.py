@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brrp_cli.planning.body import Body
-from brrp_cli.planning.mjcf import BIN_COLOUR, Table
+from brrp_cli.planning.mjcf import FURNITURE_COLOUR, Table
 from brrp_cli.planning.numbers import quaternion_wxyz
 from brrp_cli.planning.union import union_of_hulls
 
@@ -32,8 +32,8 @@ def curobo_world(bodies: Mapping[str, Body], table: Table | None, frame: str) ->
     lines.append("mesh:")
     for name, body in bodies.items():
         lines += _mesh(name, body.T_frame_body, body.colour, body.parts)
-    for name, walls in ({} if table is None else table.bins).items():
-        lines += _mesh(name, np.eye(4), BIN_COLOUR, walls)
+    for name, walls in ({} if table is None else table.furniture).items():
+        lines += _mesh(name, np.eye(4), FURNITURE_COLOUR, walls)
     return "\n".join(lines) + "\n"
 
 

@@ -16,21 +16,27 @@ from brrp_cli.planning.numbers import quaternion_wxyz, spell
 
 # Meshes are drawn from group 2 and collide in group 3, as MuJoCo's viewer expects it.
 VISUAL, COLLISION = "2", "3"
-BIN_COLOUR = (0.6, 0.6, 0.65)  # RGB, 0 to 1
+FURNITURE_COLOUR = (0.6, 0.6, 0.65)  # RGB, 0 to 1
 CLEARANCE = 0.0005  # metres between the table and what is put on it
 
 
 @dataclass(frozen=True)
 class Table:
-    """A box whose top is the support plane, and the bins on it.
+    """A box whose top is the support plane, the bins on it, and what shuts it off.
 
     T_frame_table : (4, 4) of the box's centre, z its normal; size : (3,) metres, edge to edge
-    bins : by name, corners (8, 3) of the walls of each, convex, metres, frame of the results
+    bins, walls : by name, corners (k, 3) of the walls of each, convex, metres, frame of the results
     """
 
     T_frame_table: NDArray[np.float64]
     size: NDArray[np.float64]
     bins: Mapping[str, Sequence[NDArray[np.float64]]] = field(default_factory=dict)
+    walls: Mapping[str, Sequence[NDArray[np.float64]]] = field(default_factory=dict)
+
+    @property
+    def furniture(self) -> dict[str, Sequence[NDArray[np.float64]]]:
+        """Bins and walls, by name."""
+        return {**self.bins, **self.walls}
 
     @property
     def up(self) -> NDArray[np.float64]:
@@ -77,8 +83,8 @@ def scene_mjcf(
         place = ET.SubElement(world, "body", {"name": "table", **_pose(table.T_frame_table)})
         half = spell(table.size / 2)
         ET.SubElement(place, "geom", name="table", type="box", size=half, rgba="0.7 0.66 0.6 1")
-        for name, walls in table.bins.items():
-            _add_bin(assets, world, name, walls)
+        for name, walls in table.furniture.items():
+            _add_furniture(assets, world, name, walls)
     for name, body in bodies.items():
         T = body.T_frame_body.copy() if poses is None else poses[name]
         if table is not None and poses is None:
@@ -113,16 +119,21 @@ def _model(
     return model, assets, world
 
 
-def _add_bin(
+def solid_name(name: str, number: int) -> str:
+    """Of one wall of a bin, or of one that stands alone."""
+    return f"{name}_wall_{number}" if name.startswith("bin") else name
+
+
+def _add_furniture(
     assets: ET.Element, world: ET.Element, name: str, walls: Sequence[NDArray[np.float64]]
 ) -> None:
     """It stands where it is. MuJoCo makes the hulls of its walls' corners."""
     place = ET.SubElement(world, "body", name=name)
     for number, wall in enumerate(walls):
-        own = f"{name}_wall_{number}"
+        own = solid_name(name, number)
         ET.SubElement(assets, "mesh", name=own, vertex=spell(wall.ravel()))
         ET.SubElement(
-            place, "geom", name=own, type="mesh", mesh=own, rgba=spell([*BIN_COLOUR, 1.0])
+            place, "geom", name=own, type="mesh", mesh=own, rgba=spell([*FURNITURE_COLOUR, 1.0])
         )
 
 

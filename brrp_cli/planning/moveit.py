@@ -31,7 +31,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brrp_cli.planning.body import Body
-from brrp_cli.planning.mjcf import BIN_COLOUR, Table
+from brrp_cli.planning.mjcf import FURNITURE_COLOUR, Table
 from brrp_cli.planning.numbers import quaternion_wxyz, spell
 
 if TYPE_CHECKING:
@@ -47,8 +47,8 @@ Subframes = Mapping[str, Sequence[tuple[str, Array]]]
 
 
 def scene_text(bodies: Mapping[str, Body], table: Table | None, subframes: Subframes) -> str:
-    """A `.scene` file, metres, frame of the results: each body and each bin as its convex parts,
-    the table as a box.
+    """A `.scene` file, metres, frame of the results: each body, bin and wall as its convex
+    parts, the table as a box.
 
     subframes : of bodies, by name
     """
@@ -57,8 +57,8 @@ def scene_text(bodies: Mapping[str, Body], table: Table | None, subframes: Subfr
         size = ["box", spell(table.size)]
         shape = [*size, *_pose_lines(np.eye(4)), spell(TABLE_COLOUR)]
         lines += [f"* {TABLE}", *_pose_lines(table.T_frame_table), "1", *shape, "0"]
-    for name, walls in _bins(table):
-        lines += [*_part_lines(name, np.eye(4), BIN_COLOUR, walls), "0"]
+    for name, walls in _furniture(table):
+        lines += [*_part_lines(name, np.eye(4), FURNITURE_COLOUR, walls), "0"]
     for name, body in bodies.items():
         lines += _part_lines(name, body.T_frame_body, body.colour, body.parts)
         frames = _in_body(body, subframes.get(name, ()))
@@ -94,9 +94,9 @@ def planning_scene(
             }
         )
         colours[TABLE] = TABLE_COLOUR
-    for name, walls in _bins(table):
+    for name, walls in _furniture(table):
         objects.append(_object(name, np.eye(4), frame_id) | _meshes(walls))
-        colours[name] = (*BIN_COLOUR, 1.0)
+        colours[name] = (*FURNITURE_COLOUR, 1.0)
     for name, body in bodies.items():
         frames = _in_body(body, subframes.get(name, ()))
         objects.append(
@@ -134,8 +134,8 @@ def _object(name: str, T: Array, frame_id: str) -> dict[str, Any]:
     return {"header": {"frame_id": frame_id}, "id": name, "pose": pose(T)}
 
 
-def _bins(table: Table | None) -> Iterable[tuple[str, Sequence[Array]]]:
-    return () if table is None else table.bins.items()
+def _furniture(table: Table | None) -> Iterable[tuple[str, Sequence[Array]]]:
+    return () if table is None else table.furniture.items()
 
 
 def _meshes(parts: Sequence[Array]) -> dict[str, Any]:

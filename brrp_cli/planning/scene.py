@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -19,7 +19,7 @@ from brrp_cli.planning.mjcf import Table
 from brrp_cli.planning.options import PlanOptions
 from brrp_cli.planning.parts import convex_parts
 from brrp_cli.results.read import StoredResult
-from brrp_cli.segmentation.bin_walls import Wall, bin_walls, segmentation_of
+from brrp_cli.segmentation.furniture import Furniture, furniture, segmentation_of
 from brrp_cli.surface.confidence import ConfidenceSurface, confidence_surface
 
 if TYPE_CHECKING:
@@ -84,19 +84,20 @@ def upwards(stored: StoredResult) -> NDArray[np.float64]:
 
 
 def table_under(
-    bodies: list[Body], plane: Plane | None, bins: Sequence[Sequence[Wall]] = ()
+    bodies: list[Body], plane: Plane | None, around: Furniture | None = None
 ) -> Table | None:
-    """A table whose top is the plane, under all bodies; None without a plane.
+    """A table whose top is the plane, under all bodies and bins; None without a plane.
 
-    bins : the walls of each that stands on it, frame of the results
+    around : what stands on it and shuts it off, frame of the results
     """
+    around = around or Furniture()
     if plane is None or not bodies:
         return None
     axes = body_axes(plane.normal, bodies[0].T_frame_body[:3, 0])
     corners = np.vstack(
         [
             *(transform_points(b.T_frame_body, np.vstack(b.parts)) for b in bodies),
-            *(wall for walls in bins for wall in walls),
+            *(wall for walls in around.bins for wall in walls),
         ]
     )
     local = corners @ axes
@@ -104,19 +105,16 @@ def table_under(
     middle = (low + high) / 2
     middle[2] = -plane.offset - TABLE_THICKNESS / 2
     size = np.array([*(high - low)[:2], TABLE_THICKNESS])
-    named = {f"bin_{number}": walls for number, walls in enumerate(bins, start=1)}
-    return Table(similarity(1.0, axes, axes @ middle), size, named)
+    bins = {f"bin_{number}": walls for number, walls in enumerate(around.bins, start=1)}
+    walls = {f"wall_{number}": [wall] for number, wall in enumerate(around.walls, start=1)}
+    return Table(similarity(1.0, axes, axes @ middle), size, bins, walls)
 
 
-def bins_around(stored: StoredResult) -> list[list[Wall]]:
-    """The walls of the bins on the table, frame of the results."""
-    if stored.plane is None:
-        return []
+def furniture_around(stored: StoredResult) -> Furniture:
+    """What stands on the table and shuts it off, frame of the results."""
     config = segmentation_of(stored.record["segmentation"])
-    return [
-        [np.asarray(transform_points(stored.T_frame_cam, wall)) for wall in walls]
-        for walls in bin_walls(stored.frame, stored.record["seed"], config)
-    ]
+    found = furniture(stored.frame, stored.plane_cam, stored.record["seed"], config)
+    return found.moved(stored.T_frame_cam)
 
 
 def _region(

@@ -16,14 +16,21 @@ from brrp_cli.errors import ResultError
 from brrp_cli.files import atomic_folder
 from brrp_cli.planning.body import Body
 from brrp_cli.planning.curobo import curobo_world
-from brrp_cli.planning.mjcf import BIN_COLOUR, Files, Table, body_mjcf, scene_mjcf
+from brrp_cli.planning.mjcf import (
+    FURNITURE_COLOUR,
+    Files,
+    Table,
+    body_mjcf,
+    scene_mjcf,
+    solid_name,
+)
 from brrp_cli.planning.moveit import planning_scene, scene_text
 from brrp_cli.planning.moveit_grasps import grasp_frames, grasp_messages, stored_grasps
 from brrp_cli.planning.options import PlanOptions
 from brrp_cli.planning.rest import Rest, put_to_rest
 from brrp_cli.planning.scene import (
     PlannedObject,
-    bins_around,
+    furniture_around,
     planned_objects,
     table_under,
     upwards,
@@ -67,7 +74,7 @@ def write_plan(
     with atomic_folder(folder, overwrite=overwrite, mark=RECORD) as partial:
         objects = list(planned_objects(stored, options) if planned is None else planned)
         bodies = {each.body.name: each.body for each in objects}
-        table = table_under(list(bodies.values()), stored.plane, bins_around(stored))
+        table = table_under(list(bodies.values()), stored.plane, furniture_around(stored))
         config, resting = RestConfig(), {}
         if options.rests and table is not None:
             resting = put_to_rest(bodies, table, config)
@@ -146,11 +153,12 @@ def _glb(bodies: dict[str, Body], table: Table | None) -> trimesh.Scene:
         top = trimesh.creation.box(table.size, table.T_frame_table)
         top.visual.face_colors = TABLE_COLOUR
         scene.add_geometry(top, node_name="table", geom_name="table")
-        for name, walls in table.bins.items():
+        for name, walls in table.furniture.items():
             for i, wall in enumerate(walls):
                 hull = trimesh.convex.convex_hull(wall)
-                hull.visual.face_colors = [*(round(255 * c) for c in BIN_COLOUR), 255]
-                scene.add_geometry(hull, node_name=f"{name}_wall_{i}", geom_name=f"{name}_wall_{i}")
+                hull.visual.face_colors = [*(round(255 * c) for c in FURNITURE_COLOUR), 255]
+                own = solid_name(name, i)
+                scene.add_geometry(hull, node_name=own, geom_name=own)
     return scene
 
 
@@ -185,6 +193,9 @@ def _record(
             "bins": [
                 {"name": name, "walls": [wall.tolist() for wall in walls]}
                 for name, walls in table.bins.items()
+            ],
+            "walls": [
+                {"name": name, "corners": wall.tolist()} for name, (wall,) in table.walls.items()
             ],
         },
         "objects": [

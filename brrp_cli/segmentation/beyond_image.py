@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brrp_cli.config.table import TableConfig
-from brrp_cli.segmentation.hulls import convex_hull
+from brrp_cli.hulls import convex_hull
 
 
 def beyond_image(

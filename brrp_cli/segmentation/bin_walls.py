@@ -1,66 +1,47 @@
-"""The walls of bins as solids: also where nothing shows them, a hand does not go through them."""
+"""The walls of bins as solids."""
 
 from __future__ import annotations
-
-import logging
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from brrp_cli.config.segmentation import SegmentConfig
 from brrp_cli.config.table import BinsConfig
-from brrp_cli.config.tables import changed
-from brrp_cli.errors import FrameError
-from brrp_cli.frames.frame import BACKGROUND, Frame
-from brrp_cli.geometry import backproject
+from brrp_cli.hulls import in_hull
 from brrp_cli.segmentation.bins import Bin
-from brrp_cli.segmentation.hulls import in_hull
 from brrp_cli.segmentation.outlines import corners_of, normals_of, plain, shifted
-from brrp_cli.segmentation.seen_surfaces import smoothed
-from brrp_cli.segmentation.seen_table import see_table
 from brrp_cli.segmentation.table_plane import Table
-
-log = logging.getLogger(__name__)
 
 Array = NDArray[np.float64]
 # Corners (8, 3) of a convex solid, metres, camera frame.
-Wall = Array
+Solid = Array
 
 
-def bin_walls(frame: Frame, seed: int, config: SegmentConfig) -> list[list[Wall]]:
+def bins_of(
+    table: Table, points: Array, masked: NDArray[np.bool_], config: BinsConfig
+) -> list[list[Solid]]:
     """The walls of each bin on the table, from the table up to its rim.
 
     A bin that has a mask is an object, and none of these. A side of which no rim is seen, as where
     the image's border cuts a bin, has no wall.
+
+    points : (n, 3) metres, camera frame; masked : (n,) those that have a mask
     """
-    points = backproject(smoothed(frame, config), frame.K)
-    try:
-        table = see_table(points, seed, frame.source, config).table
-    except FrameError as error:
-        log.info("No table was found, and so no bin: %s", error.what)
-        return []
-    valid = np.isfinite(points[..., 2])
-    points, masked = points[valid], frame.segmap[valid] != BACKGROUND
     plan, height = table.plan(points), table.plane.signed_distance(points)
     found = []
     for each in table.bins:
-        there = in_hull(each.outside, plan, 0.0) & (height > config.bins.low)
+        there = in_hull(each.outside, plan, 0.0) & (height > config.low)
         walls = there.copy()
-        walls[there] = Table(table.plane, table.axes, table.hull, (each,)).walls(
-            plan[there], height[there] - each.floor, config.bins
+        walls[there] = Table(table.plane, table.axes, table.hull, (each,)).bin_walls(
+            plan[there], height[there] - each.floor, config
         )
-        if not walls.any() or masked[walls].mean() < config.bins.masked:
-            found.append(walls_of(each, table, plan[there], height[there], config.bins))
+        if not walls.any() or masked[walls].mean() < config.masked:
+            found.append(walls_of(each, table, plan[there], height[there], config))
     return found
 
 
-def segmentation_of(table: dict[str, Any] | None) -> SegmentConfig:
-    """How masks were made, as results tell it; the defaults where they came with the frame."""
-    return changed(SegmentConfig(), table or {}, "the results", "segmentation.")
-
-
-def walls_of(each: Bin, table: Table, plan: Array, height: Array, config: BinsConfig) -> list[Wall]:
+def walls_of(
+    each: Bin, table: Table, plan: Array, height: Array, config: BinsConfig
+) -> list[Solid]:
     """One wall, `config.board` thick, for each side of a bin's outline; all lean alike.
 
     plan : (n, 2) of points; height : (n,) of them above the table's plane

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from brrp_cli.config.table import BinsConfig
 from brrp_cli.dependencies import import_library
-from brrp_cli.segmentation.hulls import convex_hull, in_hull
+from brrp_cli.hulls import convex_hull, in_hull
 from brrp_cli.segmentation.rectangles import rectangles
 
 Cells = NDArray[np.bool_]

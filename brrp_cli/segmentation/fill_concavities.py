@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from brrp_cli.config.segmentation import ConcavitiesConfig
 from brrp_cli.dependencies import import_library
-from brrp_cli.segmentation.hulls import convex_hull, in_hull
+from brrp_cli.hulls import convex_hull, in_hull
 
 
 def fill_inside(

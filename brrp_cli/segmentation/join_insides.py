@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from brrp_cli.config.segmentation import FootprintsConfig
 from brrp_cli.dependencies import import_library
+from brrp_cli.hulls import convex_hull, in_hull
 from brrp_cli.segmentation.components import relabel
-from brrp_cli.segmentation.hulls import convex_hull, in_hull
 
 Array = NDArray[np.floating]
 

@@ -36,7 +36,9 @@ def rising(seen: SeenSurfaces, config: SegmentConfig) -> Rising:
     """What rises in a frame."""
     lift = _lift(seen.height, seen.depth, config)
     on_table = seen.beside <= config.margin
-    on_table[on_table] = ~seen.table.walls(seen.plan[on_table], seen.height[on_table], config.bins)
+    on_table[on_table] = ~seen.table.bin_walls(
+        seen.plan[on_table], seen.height[on_table], config.bins
+    )
     with np.errstate(invalid="ignore"):
         return Rising(
             on_table & (seen.height > lift),

@@ -7,11 +7,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from brrp_cli.config.observation import WallConfig
 from brrp_cli.config.segmentation import SegmentConfig
-from brrp_cli.observation.walls import behind_wall
+from brrp_cli.hulls import beyond_hull
+from brrp_cli.observation.walls import Wall
 from brrp_cli.segmentation.beyond_image import beyond_image
 from brrp_cli.segmentation.bins import find_bins
-from brrp_cli.segmentation.hulls import beyond_hull
 from brrp_cli.segmentation.table_plane import Table, find_table
 
 
@@ -21,7 +22,7 @@ class SeenTable:
 
     plan : (H, W, 2) metres, on it; height : (H, W) metres above it or a floor of a bin; beside :
     (H, W) metres beside it and beside what of it lies beyond the image, 0 or less on it, infinite
-    on a wall behind it
+    on what shuts it off
     """
 
     table: Table
@@ -48,13 +49,21 @@ def see_table(
     if beyond is not None:
         outside = beside > 0
         beside[outside] = np.minimum(beside[outside], beyond_hull(beyond, plan[outside]))
-    wall = config.table.wall
-    for back in table.backs:
-        behind, past = (behind_wall(points, back, near) for near in (wall.near, -wall.near))
-        # What ends within the image is a box, or a thing behind the table.
-        if _of_border(behind & ~past, valid, wall.border_width) >= wall.border:
-            beside[behind] = np.inf
+    shut = [wall for wall in table.walls if _shuts_off(wall, points, valid, config.table.wall)]
+    table = replace(table, walls=tuple(shut))
+    for wall in table.walls:
+        beside[wall.holds(points, config.table.wall.near)] = np.inf
+    if table.board is not None:
+        beside[height > table.board.height - config.table.wall.near] = np.inf
     return SeenTable(table, plan, table.above_floors(plan, height), beside)
+
+
+def _shuts_off(
+    wall: Wall, points: NDArray[np.floating], valid: NDArray[np.bool_], config: WallConfig
+) -> bool:
+    """What ends within the image, and before the table does, is a box, or a thing behind it."""
+    near = np.abs(wall.patch.plane.signed_distance(points)) < config.near
+    return wall.spans or _of_border(near, valid, config.border_width) >= config.border
 
 
 def _of_border(mask: NDArray[np.bool_], valid: NDArray[np.bool_], width: int) -> float:

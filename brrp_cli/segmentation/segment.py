@@ -109,7 +109,7 @@ def _may_rise(
     """(H, W) the pixels whose own depth rises nearly as far as an object's must, `lift` (H, W)."""
     height = table.height(frame.points)
     may = height > config.rim * lift
-    may[may] = ~table.walls(table.plan(frame.points[may]), height[may], config.bins)
+    may[may] = ~table.bin_walls(table.plan(frame.points[may]), height[may], config.bins)
     return may
 
 

@@ -7,15 +7,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from brrp_cli.config.observation import WallConfig
 from brrp_cli.config.table import BinsConfig, TableConfig
-from brrp_cli.dependencies import import_library
 from brrp_cli.errors import FrameError
-from brrp_cli.observation.support_plane import Plane, largest_plane
-from brrp_cli.observation.walls import is_wall
-from brrp_cli.seeds import child_rng, child_seed
+from brrp_cli.hulls import beyond_hull, in_hull
+from brrp_cli.observation.borne import bearing
+from brrp_cli.observation.patches import largest_planes, patch_of
+from brrp_cli.observation.support_plane import Plane
+from brrp_cli.observation.walls import Board, Wall, board_over, walls_of
+from brrp_cli.seeds import child_rng
 from brrp_cli.segmentation.bins import Bin
-from brrp_cli.segmentation.hulls import beyond_hull, convex_hull, in_hull
 
 
 @dataclass(frozen=True)
@@ -26,14 +26,15 @@ class Table:
     axes : (2, 3) float64, unit, spanning the plane: plan coordinates are points @ axes.T
     hull : (m, 3) float64: plan points p with hull[:, :2] @ p + hull[:, 2] <= 0 lie on the table
     bins : on the table; they count as part of it
-    backs : upright planes behind it, turned to the camera
+    walls : at which it ends; board : over it
     """
 
     plane: Plane
     axes: NDArray[np.float64]
     hull: NDArray[np.float64]
     bins: tuple[Bin, ...] = ()
-    backs: tuple[Plane, ...] = ()
+    walls: tuple[Wall, ...] = ()
+    board: Board | None = None
 
     def plan(self, points: NDArray[np.floating]) -> NDArray[np.float64]:
         """Plan coordinates (..., 2), metres, of points (..., 3), camera frame."""
@@ -62,7 +63,7 @@ class Table:
             above.reshape(-1)[in_hull(each.outside, flat, 0.0)] -= each.floor
         return above
 
-    def walls(
+    def bin_walls(
         self, plan: NDArray[np.floating], height: NDArray[np.floating], config: BinsConfig
     ) -> NDArray[np.bool_]:
         """(n,) which of plan points (n, 2) at `height` (n,) are a bin's walls, not what it holds.
@@ -98,93 +99,52 @@ def find_table(
     if len(points) > config.points:
         drawn = child_rng(seed, "table").choice(len(points), config.points, replace=False)
         points = points[drawn]
-    planes = _largest_planes(points.astype(np.float64), seed, config)
+    planes = largest_planes(
+        np.asarray(points, dtype=np.float64),
+        seed,
+        config.support,
+        tolerance=config.tolerance,
+        iterations=config.iterations,
+        drawn_points=config.ransac_points,
+        min_points=config.min_points,
+    )
     if not planes:
         raise FrameError(
             "No support plane was found",
             where=source,
             expected="a table that fills a good part of the image",
-            found=f"no plane with {config.least:.0%} of the points",
+            found=f"no plane with {config.support.least:.0%} of the points",
             fix="check the unit of depth (--depth-scale), take the picture so that more of the"
             " table is seen, or pass masks with --masks",
         )
-    backs, rest = _walls_and_rest(planes, points, config.wall)
-    plane = _above_the_floor(rest, config)
-    axes = np.linalg.svd(plane.normal[None])[2][1:]
-    on = (points @ axes.T)[np.abs(plane.signed_distance(points)) < config.tolerance]
-    hull = convex_hull(_largest_patch(on, config.cell))
-    if hull is None:
+    patches = {
+        number: patch
+        for number, (plane, _) in enumerate(planes)
+        if (patch := patch_of(plane, points, config.tolerance, config.support.patch)) is not None
+    }
+    usual = patches.get(_above_the_floor(planes, config))
+    if usual is None:
         raise FrameError("The support plane has no extent", where=source)
-    return Table(plane=plane, axes=axes, hull=hull, backs=backs)
+    found = list(patches.values())
+    table = bearing(found, usual, points, None, config.support)
+    return Table(
+        table.plane,
+        table.axes,
+        table.hull,
+        walls=walls_of(table, found, points, config.wall),
+        board=board_over(table, found, points, config.wall),
+    )
 
 
-def _largest_planes(
-    points: NDArray[np.float64], seed: int, config: TableConfig
-) -> list[tuple[Plane, int]]:
-    """Planes with `config.least` of the points, most points first, camera side positive."""
-    planes: list[tuple[Plane, int]] = []
-    rest = points
-    least = config.least * len(points)
-    for index in range(config.candidates):
-        # What is left could be neither a plane nor a table above the floor that was found.
-        if len(rest) < max(least, config.of_floor * max((n for _, n in planes), default=0)):
-            break
-        model = largest_plane(
-            rest,
-            child_seed(seed, "table", index),
-            tolerance=config.tolerance,
-            iterations=config.iterations,
-            drawn_points=config.ransac_points,
-            min_points=config.min_points,
-        )
-        if model is None:
-            break
-        model = model if model[3] > 0 else -model
-        plane = Plane(model[:3], float(model[3]))
-        inlier = np.abs(plane.signed_distance(rest)) < config.tolerance
-        if inlier.sum() < least:
-            break
-        planes.append((plane, int(inlier.sum())))
-        rest = rest[~inlier]
-    return sorted(planes, key=lambda pair: -pair[1])
-
-
-def _walls_and_rest(
-    planes: list[tuple[Plane, int]], points: NDArray[np.floating], config: WallConfig
-) -> tuple[tuple[Plane, ...], list[tuple[Plane, int]]]:
-    """Those of the planes that are walls behind one of the others, and the others."""
-    walls = [
-        any(is_wall(plane, table, points, points, config) for table, _ in planes)
-        for plane, _ in planes
-    ]
-    rest = [pair for pair, wall in zip(planes, walls, strict=True) if not wall]
-    # In a niche each of three could be the wall of the next.
-    if not rest:
-        return (), planes
-    return tuple(plane for (plane, _), wall in zip(planes, walls, strict=True) if wall), rest
-
-
-def _above_the_floor(planes: list[tuple[Plane, int]], config: TableConfig) -> Plane:
+def _above_the_floor(planes: list[tuple[Plane, int]], config: TableConfig) -> int:
+    """The number of the largest plane, or of one that lies well above it as a table on a floor."""
     largest, size = planes[0]
-    table = largest
-    for plane, count in planes[1:]:
+    table, number = largest, 0
+    for index, (plane, count) in enumerate(planes[1:], start=1):
         parallel = plane.normal @ largest.normal > np.cos(np.radians(config.parallel))
         # Offsets are the camera's heights above the planes. What rises less than a table's legs
         # are long is the tops of things on the table.
         higher = table.offset - plane.offset > config.height
         if parallel and count >= config.of_floor * size and higher:
-            table = plane
-    return table
-
-
-def _largest_patch(plan: NDArray[np.float64], cell: float) -> NDArray[np.float64]:
-    """Those of the plan points (n, 2) that hang together: a floor beyond the edge is no table."""
-    ndimage = import_library("scipy.ndimage")
-    cells = np.floor(plan / cell).astype(np.int64)
-    cells -= cells.min(axis=0)
-    grid = np.zeros(cells.max(axis=0) + 1, dtype=bool)
-    grid[tuple(cells.T)] = True
-    # Objects hide parts of the table behind them: patches up to 8 cm apart are one.
-    joined, _ = ndimage.label(ndimage.binary_dilation(grid, iterations=2))
-    patch = joined[tuple(cells.T)]
-    return plan[patch == np.bincount(patch).argmax()]
+            table, number = plane, index
+    return number

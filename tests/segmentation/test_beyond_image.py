@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from brrp_cli.config.table import TableConfig
+from brrp_cli.hulls import beyond_hull
 from brrp_cli.segmentation.beyond_image import beyond_image
-from brrp_cli.segmentation.hulls import beyond_hull
 
 CONFIG = TableConfig()
 CELL = 0.01  # metres from one pixel to the next

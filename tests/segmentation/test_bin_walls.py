@@ -15,7 +15,7 @@ from brrp_cli.errors import FrameError
 from brrp_cli.frames.build import make_frame
 from brrp_cli.geometry import similarity, transform_points
 from brrp_cli.raycast import raycasting_scene
-from brrp_cli.segmentation.bin_walls import bin_walls, segmentation_of
+from brrp_cli.segmentation.furniture import furniture, segmentation_of
 from brrp_cli.segmentation.outlines import corners_of, normals_of, plain, shifted
 from brrp_cli.segmentation.seen_table import see_table
 from brrp_cli.shapes import solids
@@ -26,9 +26,18 @@ THING = standing((0.08, 0.06, 0.07), 0.05, 0.02)
 SQUARE = np.array([[0.0, 0.0], [2.0, 0.0], [2.0, 1.0], [0.0, 1.0]])
 
 
+def bin_walls(frame, config=CONFIG):
+    """Of each bin, camera frame."""
+    try:
+        plane = see_table(frame.points, 0, None, config).table.plane
+    except FrameError:
+        plane = None
+    return furniture(frame, plane, 0, config).bins
+
+
 def walls(frame, T=T_BIN_CAM):
     """Of the one bin, (n, 8, 3), in the bin's own frame."""
-    (found,) = bin_walls(frame, 0, CONFIG)
+    (found,) = bin_walls(frame)
     return np.stack([transform_points(T, wall) for wall in found])
 
 
@@ -90,9 +99,9 @@ def test_where_the_border_cuts_a_bin_is_no_wall():
 
 def test_a_bin_with_a_mask_is_an_object():
     frame = seen(THING)
-    found = bin_walls(frame, 0, CONFIG)
+    found = bin_walls(frame)
     whole = replace(frame, segmap=np.where(_of_the_bin(frame), 5, frame.segmap))
-    assert len(found) == 1 and bin_walls(whole, 0, CONFIG) == []
+    assert len(found) == 1 and bin_walls(whole) == []
 
 
 def _of_the_bin(frame):
@@ -109,14 +118,14 @@ def test_without_a_table_there_are_none():
     frame = make_frame(depth=depth, K=K)
     with pytest.raises(FrameError):
         see_table(frame.points, 0, None, CONFIG)
-    assert bin_walls(frame, 0, CONFIG) == []
+    assert bin_walls(frame) == []
 
 
 def test_results_tell_what_a_bin_was():
     assert segmentation_of(None) == CONFIG
     assert segmentation_of({"bins": {"area": 10.0}}).bins.area == 10.0
     none = segmentation_of({"bins": {"area": 10.0, "rectangle": 10.0}})
-    assert bin_walls(seen(THING), 0, none) == []
+    assert bin_walls(seen(THING), none) == []
 
 
 def test_corners_of_half_planes_come_in_order():

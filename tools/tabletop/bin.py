@@ -12,7 +12,7 @@ import numpy as np
 import trimesh
 
 from brrp_cli.errors import SceneError
-from tabletop.settle import Panel, rotation
+from tabletop.settle import TABLE, Panel, rotation
 
 # In the folder of a scene: the floor and the walls, boxes in the world.
 FILE = "bin.json"
@@ -39,6 +39,15 @@ class Bin:
     def radius(self) -> float:
         """Of the disc about the middle that objects are dropped within, metres."""
         return 0.35 * self.width
+
+    @property
+    def ground(self) -> Panel:
+        """The table."""
+        return TABLE
+
+    def around(self) -> list[Panel]:
+        """What stands around objects that are dropped: all of it."""
+        return self.panels()
 
     def panels(self) -> list[Panel]:
         """The floor and the walls, with the floor's underside on the table."""

@@ -43,15 +43,19 @@ def draw_camera(
     size: tuple[int, int],
     rng: np.random.Generator,
     standpoint: Standpoint | None = None,
+    azimuth: tuple[float, float] = (0, 2 * np.pi),
 ) -> Camera:
-    """A camera that looks at `center` (3,), on any side, from within `standpoint`'s ranges."""
+    """A camera that looks at `center` (3,) from within `standpoint`'s ranges.
+
+    azimuth : radians about the table's normal, between which it stands: on any side
+    """
     ranges = standpoint or Standpoint()
     distance = rng.uniform(*ranges.distance)
-    azimuth, elevation = rng.uniform(0, 2 * np.pi), np.deg2rad(rng.uniform(*ranges.elevation))
+    around, elevation = rng.uniform(*azimuth), np.deg2rad(rng.uniform(*ranges.elevation))
     backward = np.array(
         [
-            np.cos(elevation) * np.cos(azimuth),
-            np.cos(elevation) * np.sin(azimuth),
+            np.cos(elevation) * np.cos(around),
+            np.cos(elevation) * np.sin(around),
             np.sin(elevation),
         ]
     )

@@ -72,7 +72,7 @@ def render(
                 zip(models, poses, look.object_colors, strict=True)
             )
         }
-        _show(world, TABLE, look.table_color)
+        _show(world, furniture.ground if furniture else TABLE, look.table_color)
         for panel in furniture.panels() if furniture else ():
             _show(world, panel, np.array(furniture.color))
         return [_take(world, camera, look, ids, size) for camera in cameras]

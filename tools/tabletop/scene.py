@@ -29,6 +29,7 @@ from tabletop.light import draw_light, relight
 from tabletop.models import Model, load_model
 from tabletop.render import NOTHING, Picture, draw_look, render
 from tabletop.settle import Pose, drop
+from tabletop.shelf import Shelf, draw_shelf
 from tabletop.stack import stack
 from tabletop.stage import Stage, stage_of
 from tabletop.wall import draw_wall
@@ -46,7 +47,8 @@ class Plan:
     """What all scenes of a set share. `noise`: a key of `LIMITS`; `light`: one of `LIGHTS`;
     `size`: (width, height); `sensor`: one of `SENSOR_NAMES`, instead of noise; `stacked`: every
     second object is dropped onto the one before it; `binned`: objects lie in a bin; `walled`: a
-    wall stands behind them, as the first camera sees them; `standpoint`: where cameras stand."""
+    wall stands behind them, as the first camera sees them; `shelved`: they stand in a shelf;
+    `standpoint`: where cameras stand."""
 
     meshes: tuple[Path, ...]
     data_root: Path
@@ -61,6 +63,7 @@ class Plan:
     stacked: bool = False
     binned: bool = False
     walled: bool = False
+    shelved: bool = False
     standpoint: Standpoint = field(default_factory=Standpoint)
 
 
@@ -81,21 +84,27 @@ def make_scene(plan: Plan, number: int, check: bool) -> list[Distance]:
     """
     # Numbers of its own, so that other scenes stay as they are.
     bin = draw_bin(child_rng(plan.seed, "scene", number, "bin")) if plan.binned else None
+    shelf = draw_shelf(child_rng(plan.seed, "scene", number, "shelf")) if plan.shelved else None
     paths, models, poses = draw_objects(
-        plan.meshes, plan.seed, number, stacked=plan.stacked, bin=bin
+        plan.meshes, plan.seed, number, stacked=plan.stacked, holder=bin or shelf
     )
     rng = child_rng(plan.seed, "scene", number, "views")
     look = draw_look(len(models), rng)
     centers = [pose.apply(model.center[None])[0] for pose, model in zip(poses, models, strict=True)]
     center = np.mean(centers, axis=0)
-    cameras = [draw_camera(center, plan.size, rng, plan.standpoint) for _ in range(plan.views)]
+    azimuth = (0.0, 2 * np.pi) if shelf is None else shelf.azimuth
+    cameras = [
+        draw_camera(center, plan.size, rng, plan.standpoint, azimuth) for _ in range(plan.views)
+    ]
+    hulls = [
+        pose.apply(model.hull + model.center) for pose, model in zip(poses, models, strict=True)
+    ]
     furniture: Furniture | None = bin
+    if shelf is not None:
+        furniture = shelf.over(np.concatenate(hulls))
     if plan.walled:
-        points = [
-            pose.apply(model.hull + model.center) for pose, model in zip(poses, models, strict=True)
-        ]
         wall_rng = child_rng(plan.seed, "scene", number, "wall")
-        furniture = draw_wall(np.concatenate(points), cameras[0], wall_rng)
+        furniture = draw_wall(np.concatenate(hulls), cameras[0], wall_rng)
     pictures = render(models, poses, look, cameras, plan.size, furniture)
     if plan.light == "varied":
         light_rng = child_rng(plan.seed, "scene", number, "light")
@@ -114,8 +123,8 @@ def make_scene(plan: Plan, number: int, check: bool) -> list[Distance]:
             for i, (path, pose) in enumerate(zip(paths, poses, strict=True))
         ]
         (partial / "objects.json").write_text(json.dumps(entries, indent=2) + "\n")
-        if bin is not None:
-            write_panels(bin.panels(), partial)
+        if isinstance(furniture, Bin | Shelf):
+            write_panels(furniture.panels(), partial)
         for i, (camera, picture) in enumerate(zip(cameras, pictures, strict=True)):
             depth = picture.depth
             if plan.noise != "none":
@@ -148,15 +157,15 @@ def draw_objects(
     number: int,
     *,
     stacked: bool = False,
-    bin: Bin | None = None,
+    holder: Bin | Shelf | None = None,
 ) -> tuple[list[Path], list[Model], list[Pose]]:
     """Three to ten objects that lie still on the table; drawn again until there are three.
 
     A mesh comes twice only where there are fewer meshes than objects.
     """
     place = stack if stacked else drop
-    if bin is not None:
-        place = partial(drop, panels=bin.panels(), radius=bin.radius)
+    if holder is not None:
+        place = partial(drop, panels=holder.around(), radius=holder.radius, ground=holder.ground)
     for attempt in range(MAX_DRAWS):
         rng = child_rng(seed, "scene", number, "objects", attempt)
         count = int(rng.integers(FEWEST, MOST + 1))

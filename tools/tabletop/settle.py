@@ -70,18 +70,19 @@ def drop(
     rng: np.random.Generator,
     panels: Sequence[Panel] = (),
     radius: float | None = None,
+    ground: Panel = TABLE,
 ) -> list[Pose | None]:
     """Where each model comes to rest; None for one that fell off the table.
 
     Drawn from `rng`: place and orientation of each drop. All are None if the heap does not come to
     rest or was pressed into the table.
 
-    panels : what stands on the table and stays there
+    panels : what stands on the table and stays there; ground : the table, or the floor beneath
     radius : metres; no drop is further from the middle (default: `drop_radius`)
     """
     with new_world() as world:
         world.setGravity(0, 0, -9.81)
-        for panel in (TABLE, *panels):
+        for panel in (ground, *panels):
             add_panel(world, panel)
         bodies: list[int] = []
         radius = drop_radius(models) if radius is None else min(radius, drop_radius(models))

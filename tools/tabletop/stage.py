@@ -147,7 +147,8 @@ def stage_of(
             for model, pose, color in zip(models, poses, colors, strict=True)
         )
     ]
-    surfaces.append(_panel(TABLE, *_furniture(rng), R, t))
+    ground = TABLE if furniture is None else furniture.ground
+    surfaces.append(_panel(ground, *_furniture(rng), R, t))
     if furniture is not None:
         material = _furniture(rng)
         surfaces += [_panel(panel, *material, R, t) for panel in furniture.panels()]

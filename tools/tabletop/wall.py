@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tabletop.camera import Camera
-from tabletop.settle import Panel
+from tabletop.settle import TABLE, Panel
 
 # Half its size, metres: it fills the upper part of every image that has one.
 HALF = np.array([0.01, 2.0, 0.75])
@@ -25,6 +25,11 @@ class Wall:
     position: NDArray[np.float64]
     turn: float
     color: tuple[float, float, float]
+
+    @property
+    def ground(self) -> Panel:
+        """The table."""
+        return TABLE
 
     def panels(self) -> list[Panel]:
         """The wall, which stands on the table's plane."""

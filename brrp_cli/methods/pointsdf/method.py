@@ -29,10 +29,10 @@ from brrp_cli.methods.each_object import with_surface
 from brrp_cli.methods.pointsdf.decoder_file import read_decoder, write_decoder
 from brrp_cli.methods.pointsdf.farthest_points import farthest_points
 from brrp_cli.methods.pointsdf.weights import OWN_WEIGHTS, Weights, load_weights
+from brrp_cli.observation.borne import supporting_plane
 from brrp_cli.observation.ray_samples import box_center
 from brrp_cli.observation.strays import without_strays
 from brrp_cli.observation.support_plane import Plane
-from brrp_cli.observation.walls import supporting_plane
 from brrp_cli.progress import progress
 from brrp_cli.reconstruction import (
     METRES,

@@ -1,0 +1,147 @@
+"""Which of the large planes bears the things: a table or a board of a shelf, no wall or floor."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brrp_cli.config.observation import ObservationConfig, SupportConfig
+from brrp_cli.geometry import lengths
+from brrp_cli.hulls import in_hull
+from brrp_cli.observation.patches import Patch, largest_planes, patch_of
+from brrp_cli.observation.support_plane import Plane, fit_plane
+from brrp_cli.seeds import child_rng, child_seed
+
+Points = NDArray[np.floating]
+
+IMAGE_UP = np.array([0.0, -1.0, 0.0])
+
+
+def supporting_plane(
+    points: Points, things: Points, config: ObservationConfig, seed: int, toward: Points
+) -> Plane | None:
+    """The largest plane of the background, as `fit_plane` finds it, or that one which bears the
+    objects.
+
+    points : (n, 3) of the background; things : (m, 3) of the objects; toward : (3,) the scene's
+    centre; metres, camera frame. None where no plane is found.
+    """
+    largest = fit_plane(points, config, seed, toward)
+    if largest is None or config.support is None:
+        return largest
+    near = points[lengths(points - toward) < config.plane_radius]
+    rng = child_rng(seed, "patches")
+    near, things = (_drawn(each, config.support.points, rng) for each in (near, things))
+    planes = largest_planes(
+        near,
+        child_seed(seed, "patches"),
+        config.support,
+        tolerance=config.plane_tolerance,
+        iterations=config.plane_iterations,
+        drawn_points=config.plane_ransac_points,
+        min_points=config.plane_min_points,
+        first=largest,
+    )
+    if len(planes) < 2:
+        return largest
+    patches = [
+        patch
+        for plane, _ in planes
+        if (patch := patch_of(plane, near, config.plane_tolerance, config.support.patch))
+    ]
+    usual = next((patch for patch in patches if patch.plane is largest), None)
+    return largest if usual is None else bearing(patches, usual, near, things, config.support).plane
+
+
+def _drawn(points: Points, most: int, rng: np.random.Generator) -> NDArray[np.float64]:
+    if len(points) > most:
+        points = points[rng.choice(len(points), most, replace=False)]
+    return points.astype(np.float64)
+
+
+def bearing(
+    patches: Sequence[Patch],
+    usual: Patch,
+    points: Points,
+    things: Points | None,
+    config: SupportConfig,
+) -> Patch:
+    """The patch on which most stands, or `usual` where on none stands much more.
+
+    A patch behind which something is seen is none: such planes go through heaps of things, or
+    through the front edges of a shelf.
+
+    points : (n, 3) metres, camera frame; things : (m, 3) of what stands there; None: what is off
+    every patch
+    """
+    whole = [
+        each
+        for each in patches
+        if each.seen_through(points, config.off) <= config.through * each.count
+    ]
+    large = [e for e in whole if e is usual or _is_furniture(e, usual, points, config)]
+    if things is None:
+        things = _off_all(large, points, config.off)
+    bears = {id(each): _bears(each, things, config) for each in large}
+    by_usual = bears.get(id(usual), np.zeros(2))
+    better = [
+        each
+        for each in large
+        if each.count >= config.of_largest * usual.count
+        and bears[id(each)][0] >= config.fewest
+        and (bears[id(each)] > _times(each, usual, config) * by_usual).all()
+    ]
+    return max(better, key=lambda each: bears[id(each)][0], default=usual)
+
+
+def _bears(patch: Patch, things: Points, config: SupportConfig) -> NDArray[np.float64]:
+    """`standing_on`, which counts for more where the patch faces up in the image."""
+    upright = max(float(patch.plane.normal @ IMAGE_UP), 0.0)
+    return np.array(standing_on(patch, things, config)) * (1 + config.up * upright)
+
+
+def _is_furniture(patch: Patch, usual: Patch, points: Points, config: SupportConfig) -> bool:
+    """Whether a patch is no face of a thing on the usual one: it is large, and square to that or
+    parallel and far from it."""
+    alike = abs(patch.plane.normal @ usual.plane.normal)
+    if patch.across < config.across:
+        return False
+    if not _are_parallel(patch, usual, config):
+        return bool(alike < np.sin(np.radians(config.turn)))
+    on = points[np.abs(patch.plane.signed_distance(points)) < config.off]
+    return float(np.median(np.abs(usual.plane.signed_distance(on)))) > config.apart
+
+
+def _are_parallel(one: Patch, other: Patch, config: SupportConfig) -> bool:
+    return bool(abs(one.plane.normal @ other.plane.normal) > np.cos(np.radians(config.turn)))
+
+
+def _times(patch: Patch, usual: Patch, config: SupportConfig) -> float:
+    """How many times as much must stand on a patch: what is on a floor is no matter of a table."""
+    beneath = patch.plane.offset > usual.plane.offset
+    return config.beneath if beneath and _are_parallel(patch, usual, config) else config.times
+
+
+def _off_all(patches: Sequence[Patch], points: Points, off: float) -> Points:
+    away = np.ones(len(points), dtype=bool)
+    for each in patches:
+        away &= np.abs(each.plane.signed_distance(points)) > off
+    return points[away]
+
+
+def standing_on(patch: Patch, things: Points, config: SupportConfig) -> tuple[int, int]:
+    """In how many cells of a patch something stands, and how many of things (n, 3), metres, camera
+    frame, these are: the lowest in a cell is within `config.low` of the patch."""
+    height = patch.plane.signed_distance(things)
+    above = (height > 0) & (height < config.high)
+    above[above] = in_hull(patch.hull, patch.plan(things[above]), config.off)
+    if not above.any():
+        return 0, 0
+    cells = np.floor(patch.plan(things[above]) / config.cell).astype(np.int64)
+    _, number, count = np.unique(cells, axis=0, return_inverse=True, return_counts=True)
+    lowest = np.full(len(count), np.inf)
+    np.minimum.at(lowest, number.ravel(), height[above])
+    stands = lowest < config.low
+    return int(stands.sum()), int(count[stands].sum())

@@ -1,0 +1,124 @@
+"""What a frame shows of its large planes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brrp_cli.config.observation import SupportConfig
+from brrp_cli.dependencies import import_library
+from brrp_cli.hulls import convex_hull, in_hull
+from brrp_cli.observation.support_plane import Plane, largest_plane
+from brrp_cli.seeds import child_seed
+
+Points = NDArray[np.floating]
+
+
+@dataclass(frozen=True)
+class Patch:
+    """The part of a plane that hangs together.
+
+    plane : the camera's side is positive
+    axes : (2, 3) unit, spanning the plane: plan coordinates are points @ axes.T
+    hull : (m, 3) plan points p with hull[:, :2] @ p + hull[:, 2] <= 0 lie within it
+    count : points near the plane; across : metres between the ends of its hull
+    """
+
+    plane: Plane
+    axes: NDArray[np.float64]
+    hull: NDArray[np.float64]
+    count: int
+    across: float
+
+    def plan(self, points: Points) -> NDArray[np.float64]:
+        """Plan coordinates (..., 2), metres, of points (..., 3), camera frame."""
+        return np.asarray(points @ self.axes.T, dtype=np.float64)
+
+    def seen_through(self, points: Points, off: float) -> int:
+        """How many of points (n, 3), metres, camera frame, are seen behind it, more than `off`
+        metres from its plane and from its outline: none, if it is one surface."""
+        behind = points[self.plane.signed_distance(points) < -off]
+        crossing = behind * (-self.plane.offset / (behind @ self.plane.normal))[:, None]
+        return int(in_hull(self.hull, self.plan(crossing), -off).sum())
+
+
+def patch_of(plane: Plane, points: Points, tolerance: float, cell: float) -> Patch | None:
+    """The patch of points (n, 3), metres, camera frame, that are nearer to a plane than
+    `tolerance`, on a grid of `cell` metres; None where it has no extent."""
+    axes = np.linalg.svd(plane.normal[None])[2][1:]
+    near = points[np.abs(plane.signed_distance(points)) < tolerance]
+    if not len(near):
+        return None
+    on = _largest_patch(near @ axes.T, cell)
+    hull = convex_hull(on)
+    if hull is None:
+        return None
+    # The ends of it in each of its directions, which are many enough.
+    ends = on @ hull[:, :2].T
+    across = float((ends.max(axis=0) - ends.min(axis=0)).max())
+    return Patch(plane, axes, hull, len(near), across)
+
+
+def largest_planes(
+    points: NDArray[np.float64],
+    seed: int,
+    config: SupportConfig,
+    *,
+    tolerance: float,
+    first: Plane | None = None,
+    **ransac: int,
+) -> list[tuple[Plane, int]]:
+    """The planes with most of points (n, 3), metres, camera frame, with their counts, most first.
+
+    They are found one after the other by `largest_plane`, which tells of the rest. first : of
+    them, where it is known.
+    """
+    planes: list[tuple[Plane, int]] = []
+    rest = points
+    least = config.least * len(points)
+    for index in range(config.candidates):
+        # Where no second plane is large enough, the first is the table, and others are its things.
+        enough = config.of_largest * planes[0][1] if index == 1 else 0.0
+        if len(rest) < max(least, enough):
+            break
+        plane = (
+            first
+            if first is not None and not index
+            else _largest(rest, child_seed(seed, "table", index), tolerance, ransac)
+        )
+        if plane is None:
+            break
+        inlier = np.abs(plane.signed_distance(rest)) < tolerance
+        if inlier.sum() < least:
+            break
+        planes.append((plane, int(inlier.sum())))
+        rest = rest[~inlier]
+        if inlier.sum() < enough:
+            break
+    return sorted(planes, key=lambda pair: -pair[1])
+
+
+def _largest(
+    points: NDArray[np.float64], seed: int, tolerance: float, ransac: dict[str, int]
+) -> Plane | None:
+    model = largest_plane(points, seed, tolerance=tolerance, **ransac)
+    if model is None:
+        return None
+    return (
+        Plane(model[:3], float(model[3])) if model[3] > 0 else Plane(-model[:3], -float(model[3]))
+    )
+
+
+def _largest_patch(plan: NDArray[np.float64], cell: float) -> NDArray[np.float64]:
+    """Those of the plan points (n, 2) that hang together: a floor beyond the edge is no table."""
+    ndimage = import_library("scipy.ndimage")
+    cells = np.floor(plan / cell).astype(np.int64)
+    cells -= cells.min(axis=0)
+    grid = np.zeros(cells.max(axis=0) + 1, dtype=bool)
+    grid[tuple(cells.T)] = True
+    # Objects hide parts of the table behind them: patches up to 8 cm apart are one.
+    joined, _ = ndimage.label(ndimage.binary_dilation(grid, iterations=2))
+    patch = joined[tuple(cells.T)]
+    return plan[patch == np.bincount(patch).argmax()]
