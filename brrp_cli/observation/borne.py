@@ -70,17 +70,10 @@ def bearing(
 ) -> Patch:
     """The patch on which most stands, or `usual` where on none stands much more.
 
-    A patch behind which something is seen is none: such planes go through heaps of things, or
-    through the front edges of a shelf.
-
     points : (n, 3) metres, camera frame; things : (m, 3) of what stands there; None: what is off
     every patch
     """
-    whole = [
-        each
-        for each in patches
-        if each.seen_through(points, config.off) <= config.through * each.count
-    ]
+    whole = [each for each in patches if each.is_whole(points, config)]
     large = [e for e in whole if e is usual or _is_furniture(e, usual, points, config)]
     if things is None:
         things = _off_all(large, points, config.off)

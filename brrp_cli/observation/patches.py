@@ -36,6 +36,11 @@ class Patch:
         """Plan coordinates (..., 2), metres, of points (..., 3), camera frame."""
         return np.asarray(points @ self.axes.T, dtype=np.float64)
 
+    def is_whole(self, points: Points, config: SupportConfig) -> bool:
+        """Whether next to nothing of points (n, 3), metres, camera frame, is seen behind it: not so
+        what goes through a heap of things, or through the front edges of a shelf."""
+        return self.seen_through(points, config.off) <= config.through * self.count
+
     def seen_through(self, points: Points, off: float) -> int:
         """How many of points (n, 3), metres, camera frame, are seen behind it, more than `off`
         metres from its plane and from its outline: none, if it is one surface."""

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from brrp_cli.config.observation import WallConfig
+from brrp_cli.config.observation import SupportConfig, WallConfig
 from brrp_cli.geometry import normalise
 from brrp_cli.hulls import in_hull
 from brrp_cli.observation.patches import Patch, patch_of
@@ -21,12 +21,14 @@ class Wall:
     """An upright plane at which a table ends.
 
     patch : what is seen of it; outside : whether the table lies behind it, as it does behind the
-    outer face of a shelf's side; spans : whether it goes along all of the table
+    outer face of a shelf's side; spans : whether it goes along all of the table; whole : whether it
+    is one surface, and not the front edges of a shelf
     """
 
     patch: Patch
     outside: bool
     spans: bool
+    whole: bool
 
     def holds(self, points: Array, near: float) -> NDArray[np.bool_]:
         """(...,) which of points (..., 3), metres, camera frame, are the wall or lie behind it:
@@ -47,7 +49,11 @@ class Board:
 
 
 def walls_of(
-    table: Patch, patches: Sequence[Patch], points: Array, config: WallConfig
+    table: Patch,
+    patches: Sequence[Patch],
+    points: Array,
+    config: WallConfig,
+    support: SupportConfig,
 ) -> tuple[Wall, ...]:
     """The upright ones of the patches that have all of the table on one side.
 
@@ -70,7 +76,8 @@ def walls_of(
         rises = wall[table.plane.signed_distance(wall) > config.near]
         along = normalise(np.cross(table.plane.normal, patch.plane.normal))
         spans = _covers(rises @ along, flat @ along, config.cell) >= config.spans
-        found.append(Wall(patch, in_front < 0.5, spans))
+        whole = patch.is_whole(points, support)
+        found.append(Wall(patch, in_front < 0.5, spans, whole))
     return tuple(found)
 
 

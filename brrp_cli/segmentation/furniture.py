@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from brrp_cli.config.segmentation import SegmentConfig
 from brrp_cli.config.tables import changed
-from brrp_cli.errors import FrameError
+from brrp_cli.errors import ConfigError, FrameError
 from brrp_cli.frames.frame import BACKGROUND, Frame
 from brrp_cli.geometry import backproject
 from brrp_cli.observation.patches import Patch
@@ -80,8 +80,16 @@ def furniture(frame: Frame, plane: Plane | None, seed: int, config: SegmentConfi
 
 
 def segmentation_of(table: dict[str, Any] | None) -> SegmentConfig:
-    """How masks were made, as results tell it; the defaults where they came with the frame."""
-    return changed(SegmentConfig(), table or {}, "the results", "segmentation.")
+    """How masks were made, as results tell it; the defaults where they came with the frame, or
+    where another version made them that knew other numbers."""
+    try:
+        return changed(SegmentConfig(), table or {}, "the results", "segmentation.")
+    except ConfigError as error:
+        log.warning(
+            "Another version made the masks (%s): bins and walls are looked for with the defaults",
+            error.where,
+        )
+        return SegmentConfig()
 
 
 def _same(one: Plane, other: Plane, near: Array, config: SegmentConfig) -> bool:
@@ -95,7 +103,7 @@ def _walls(
 ) -> list[Solid]:
     """A slab behind each face that is seen of what shuts a table off."""
     wall = config.table.wall
-    faces = [each.patch for each in table.walls]
+    faces = [each.patch for each in table.walls if each.whole]
     if table.board is not None:
         faces.append(table.board.patch)
     near = [np.abs(face.plane.signed_distance(points)) < wall.near for face in faces]

@@ -42,19 +42,22 @@ def see_table(
     table = find_table(points[valid], seed, source, config.table)
     plan, height = table.plan(points), table.plane.signed_distance(points)
     beside = table.beside(plan)
-    near = beside <= config.bins.beside
-    table = replace(table, bins=find_bins(plan[near], height[near], config.bins))
+    walls = config.table.wall
+    shut = [wall for wall in table.walls if _shuts_off(wall, points, valid, walls)]
+    off = np.zeros(valid.shape, dtype=bool)
+    for wall in shut:
+        off |= wall.holds(points, walls.near)
+    if table.board is not None:
+        off |= height > table.board.height - walls.near
+    near = (beside <= config.bins.beside) & ~off
+    bins = find_bins(plan[near], height[near], config.bins)
+    table = replace(table, walls=tuple(shut), bins=bins)
     flat = (np.abs(height) < config.table.tolerance) & (beside <= 0)
     beyond = beyond_image(plan, flat, config.table)
     if beyond is not None:
         outside = beside > 0
         beside[outside] = np.minimum(beside[outside], beyond_hull(beyond, plan[outside]))
-    shut = [wall for wall in table.walls if _shuts_off(wall, points, valid, config.table.wall)]
-    table = replace(table, walls=tuple(shut))
-    for wall in table.walls:
-        beside[wall.holds(points, config.table.wall.near)] = np.inf
-    if table.board is not None:
-        beside[height > table.board.height - config.table.wall.near] = np.inf
+    beside[off] = np.inf
     return SeenTable(table, plan, table.above_floors(plan, height), beside)
 
 

@@ -131,7 +131,7 @@ def find_table(
         table.plane,
         table.axes,
         table.hull,
-        walls=walls_of(table, found, points, config.wall),
+        walls=walls_of(table, found, points, config.wall, config.support),
         board=board_over(table, found, points, config.wall),
     )
 

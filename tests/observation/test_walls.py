@@ -76,7 +76,7 @@ def test_what_is_near_a_wall_or_behind_it_is_no_thing():
     patch = Patch(plane, np.eye(3)[:2], np.zeros((0, 3)), 0, 0.0)
     depths = np.array([1.9, 1.95, 1.96, 2.0, 2.3])
     points = np.stack([0 * depths, 0 * depths, depths], axis=-1)
-    inner, outer = (Wall(patch, outside, True) for outside in (False, True))
+    inner, outer = (Wall(patch, outside, True, True) for outside in (False, True))
     assert inner.holds(points, 0.012).tolist() == [False, False, True, True, True]
     assert outer.holds(points, 0.012).tolist() == [False, False, True, True, False]
 
