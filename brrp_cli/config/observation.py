@@ -44,7 +44,7 @@ class WallConfig:
     near: float = 0.012
     in_front: float = between(0.9, 0.5, 1.0)
     cell: float = 0.02
-    spans: float = share(0.7)
+    spans: float = share(0.5)
     border: float = share(0.1)
     border_width: int = between(16, 1, 1000)
     board_above: float = 0.12
@@ -73,8 +73,8 @@ class SupportConfig:
     """
 
     points: int = 40_000
-    candidates: int = between(8, 1, 32)
-    least: float = share(0.03)
+    candidates: int = between(10, 1, 32)
+    least: float = share(0.02)
     of_largest: float = share(0.1)
     patch: float = 0.02
     through: float = share(0.1)

@@ -14,6 +14,7 @@ class TableConfig:
 
     points : so many are drawn, and of those ransac_points for RANSAC; iterations : of it;
     tolerance : metres of its inliers; min_points : of them, at least
+    least : part of the points that the largest plane holds
     parallel : degrees between the table and a floor; height : metres of the table above a floor;
     of_floor : points of the table, as a part of the floor's
     cell : metres of the grid on which the plane's points hang together
@@ -28,6 +29,7 @@ class TableConfig:
     min_points: int = 100
     iterations: int = 500
     tolerance: float = 0.01
+    least: float = share(0.05)
     parallel: float = between(10.0, 0.0, 90.0)
     height: float = 0.2
     of_floor: float = share(0.25)

@@ -73,8 +73,12 @@ def bearing(
     points : (n, 3) metres, camera frame; things : (m, 3) of what stands there; None: what is off
     every patch
     """
+    if len(patches) < 2:
+        return usual
     whole = [each for each in patches if each.is_whole(points, config)]
-    large = [e for e in whole if e is usual or _is_furniture(e, usual, points, config)]
+    # What goes through a heap tells no directions.
+    main = usual if _holds(whole, usual) else max(whole, key=lambda e: e.count, default=usual)
+    large = [e for e in whole if e is main or _is_furniture(e, main, points, config)]
     if things is None:
         things = _off_all(large, points, config.off)
     bears = {id(each): _bears(each, things, config) for each in large}
@@ -86,7 +90,11 @@ def bearing(
         and bears[id(each)][0] >= config.fewest
         and (bears[id(each)] > _times(each, usual, config) * by_usual).all()
     ]
-    return max(better, key=lambda each: bears[id(each)][0], default=usual)
+    return max(better, key=lambda each: bears[id(each)].prod(), default=usual)
+
+
+def _holds(patches: Sequence[Patch], one: Patch) -> bool:
+    return any(each is one for each in patches)
 
 
 def _bears(patch: Patch, things: Points, config: SupportConfig) -> NDArray[np.float64]:

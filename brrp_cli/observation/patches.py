@@ -83,6 +83,7 @@ def largest_planes(
     planes: list[tuple[Plane, int]] = []
     rest = points
     least = config.least * len(points)
+    density = ransac["drawn_points"] / max(len(points), 1)
     for index in range(config.candidates):
         # Where no second plane is large enough, the first is the table, and others are its things.
         enough = config.of_largest * planes[0][1] if index == 1 else 0.0
@@ -91,7 +92,7 @@ def largest_planes(
         plane = (
             first
             if first is not None and not index
-            else _largest(rest, child_seed(seed, "table", index), tolerance, ransac)
+            else _largest(rest, child_seed(seed, "table", index), tolerance, ransac, density)
         )
         if plane is None:
             break
@@ -106,9 +107,11 @@ def largest_planes(
 
 
 def _largest(
-    points: NDArray[np.float64], seed: int, tolerance: float, ransac: dict[str, int]
+    points: NDArray[np.float64], seed: int, tolerance: float, ransac: dict[str, int], density: float
 ) -> Plane | None:
-    model = largest_plane(points, seed, tolerance=tolerance, **ransac)
+    """`largest_plane` of what is left of points, of which it draws as dense a part as of all."""
+    drawn = max(ransac["min_points"], round(density * len(points)))
+    model = largest_plane(points, seed, tolerance=tolerance, **{**ransac, "drawn_points": drawn})
     if model is None:
         return None
     return (

@@ -68,15 +68,13 @@ def furniture(frame: Frame, plane: Plane | None, seed: int, config: SegmentConfi
     except FrameError as error:
         log.info("No table was found, and so nothing around it: %s", error.what)
         return Furniture()
-    valid = np.isfinite(points[..., 2])
-    if plane is None or not _same(
-        plane, table.plane, frame.points[frame.segmap != BACKGROUND], config
-    ):
+    own = frame.points[frame.valid & (frame.segmap != BACKGROUND)]
+    if plane is None or not _same(plane, table, own, config):
         return Furniture()
-    points, masked = points[valid].astype(np.float64), frame.segmap[valid] != BACKGROUND
-    return Furniture(
-        bins_of(table, points, masked, config.bins), _walls(table, points, masked, config)
-    )
+    valid = np.isfinite(points[..., 2])
+    masked = frame.segmap[valid] != BACKGROUND
+    seen = np.asarray(points[valid], dtype=np.float64)
+    return Furniture(bins_of(table, seen, masked, config.bins), _walls(table, seen, masked, config))
 
 
 def segmentation_of(table: dict[str, Any] | None) -> SegmentConfig:
@@ -92,10 +90,14 @@ def segmentation_of(table: dict[str, Any] | None) -> SegmentConfig:
         return SegmentConfig()
 
 
-def _same(one: Plane, other: Plane, near: Array, config: SegmentConfig) -> bool:
-    """Whether two planes are one where points (n, 3), metres, camera frame, lie."""
-    off = one.signed_distance(near) - other.signed_distance(near)
-    return len(off) > 0 and float(np.nanmedian(np.abs(off))) < config.table.support.low
+def _same(plane: Plane, table: Table, own: NDArray[np.floating], config: SegmentConfig) -> bool:
+    """Whether a plane is the table's, or a floor of a bin on it, where points (n, 3) of the
+    objects, metres, camera frame, lie."""
+    if not len(own):
+        return False
+    above = float(np.median(table.plane.signed_distance(own) - plane.signed_distance(own)))
+    floors = [0.0, *(each.floor for each in table.bins)]
+    return min(abs(above - floor) for floor in floors) < config.table.support.low
 
 
 def _walls(
@@ -103,7 +105,7 @@ def _walls(
 ) -> list[Solid]:
     """A slab behind each face that is seen of what shuts a table off."""
     wall = config.table.wall
-    faces = [each.patch for each in table.walls if each.whole]
+    faces = [each.patch for each in table.walls if each.whole and each.spans]
     if table.board is not None:
         faces.append(table.board.patch)
     near = [np.abs(face.plane.signed_distance(points)) < wall.near for face in faces]

@@ -43,35 +43,33 @@ def see_table(
     plan, height = table.plan(points), table.plane.signed_distance(points)
     beside = table.beside(plan)
     walls = config.table.wall
-    shut = [wall for wall in table.walls if _shuts_off(wall, points, valid, walls)]
     off = np.zeros(valid.shape, dtype=bool)
-    for wall in shut:
-        off |= wall.holds(points, walls.near)
+    for wall in table.walls:
+        if wall.spans:
+            off |= wall.holds(points, walls.near)
     if table.board is not None:
         off |= height > table.board.height - walls.near
     near = (beside <= config.bins.beside) & ~off
-    bins = find_bins(plan[near], height[near], config.bins)
-    table = replace(table, walls=tuple(shut), bins=bins)
+    table = replace(table, bins=find_bins(plan[near], height[near], config.bins))
     flat = (np.abs(height) < config.table.tolerance) & (beside <= 0)
     beyond = beyond_image(plan, flat, config.table)
     if beyond is not None:
         outside = beside > 0
         beside[outside] = np.minimum(beside[outside], beyond_hull(beyond, plan[outside]))
+    for wall in table.walls:
+        if not wall.spans and _fills_border(wall, points, valid, walls):
+            off |= wall.holds(points, walls.near)
     beside[off] = np.inf
     return SeenTable(table, plan, table.above_floors(plan, height), beside)
 
 
-def _shuts_off(
+def _fills_border(
     wall: Wall, points: NDArray[np.floating], valid: NDArray[np.bool_], config: WallConfig
 ) -> bool:
-    """What ends within the image, and before the table does, is a box, or a thing behind it."""
+    """Whether a wall fills much of the image's border: what ends within the image, and before the
+    table does, is a box, or a thing behind it."""
     near = np.abs(wall.patch.plane.signed_distance(points)) < config.near
-    return wall.spans or _of_border(near, valid, config.border_width) >= config.border
-
-
-def _of_border(mask: NDArray[np.bool_], valid: NDArray[np.bool_], width: int) -> float:
-    """The share of the pixels with depth along the image's border, `width` pixels of it, that a
-    mask (H, W) holds."""
     border = valid.copy()
+    width = config.border_width
     border[width:-width, width:-width] = False
-    return float(mask[border].mean()) if border.any() else 0.0
+    return bool(border.any() and near[border].mean() >= config.border)

@@ -108,12 +108,12 @@ def find_table(
         drawn_points=config.ransac_points,
         min_points=config.min_points,
     )
-    if not planes:
+    if not planes or planes[0][1] < config.least * len(points):
         raise FrameError(
             "No support plane was found",
             where=source,
             expected="a table that fills a good part of the image",
-            found=f"no plane with {config.support.least:.0%} of the points",
+            found=f"no plane with {config.least:.0%} of the points",
             fix="check the unit of depth (--depth-scale), take the picture so that more of the"
             " table is seen, or pass masks with --masks",
         )

@@ -1,4 +1,4 @@
-"""Scenes in a bin, before a wall, and on one another."""
+"""Scenes in a bin, in a shelf, before a wall, and on one another."""
 
 from __future__ import annotations
 
@@ -14,10 +14,12 @@ from made_scenes import bytes_of, generate, write_box, write_two
 from tabletop.bin import draw_bin
 from tabletop.models import find_meshes, load_model
 from tabletop.settle import rotation
+from tabletop.shelf import BESIDE, draw_shelf
 from tabletop.stack import stack
 
 from brrp_cli.geometry import transform_points
 from brrp_cli.ground_truth.scenes import find_scenes, true_mesh
+from brrp_cli.raycast import raycasting_scene
 from brrp_cli.seeds import child_rng
 
 
@@ -66,6 +68,51 @@ def test_a_bins_walls_stand_around_its_floor(seed):
     assert len(spans) == 2
 
 
+def test_objects_stand_in_a_shelf_that_a_camera_sees_into(data):
+    options = ("--scenes", 2, "--views", 2, "--elevation", 10, 25, "--shelf")
+    for folder in ("shelved", "shelved_again"):
+        result = generate(data, data / folder, *options)
+        assert result.exit_code == 0, result.output
+    assert bytes_of(data / "shelved") == bytes_of(data / "shelved_again")
+    for number, scene in enumerate(find_scenes(data / "shelved")):
+        shelf = draw_shelf(child_rng(0, "scene", number, "shelf"))
+        back = np.array([np.cos(shelf.turn), np.sin(shelf.turn), 0.0])
+        across = np.array([-back[1], back[0], 0.0])
+        for each in scene.objects:
+            vertices = true_mesh(each, data).vertices
+            assert vertices[:, 2].min() == pytest.approx(0.0, abs=0.002)
+            assert (vertices @ back).min() > -shelf.depth / 2 - 0.002
+            assert np.abs(vertices @ across).max() < shelf.width / 2 + 0.002
+        for view in (0, 1):
+            frame = scene.view(view)
+            aside = np.arctan2(*(frame.T_world_cam[:3, 3] @ np.stack([across, back]).T))
+            assert abs(np.rad2deg(aside)) < 2 * BESIDE, "it stands before the opening"
+            assert frame.object_ids, "objects show"
+            points = transform_points(frame.T_world_cam, frame.points[frame.valid].astype(float))
+            behind = points[:, :2] @ back[:2] < -shelf.depth / 2 + 1e-3
+            assert behind.mean() > 0.05 and (frame.segmap[frame.valid][behind] == 0).all()
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_shelfs_boards_close_it_but_for_its_front(seed):
+    shelf = draw_shelf(np.random.default_rng(seed)).over(np.array([[0.0, 0.0, 0.3]]))
+    assert shelf.height > 0.3
+    boxes = [trimesh.creation.box(2 * panel.half, _pose(panel)) for panel in shelf.panels()]
+    inside = np.array([0.0, 0.0, shelf.height / 2])
+    turn = trimesh.transformations.rotation_matrix(shelf.turn, [0, 0, 1])[:3, :3]
+    ways = np.array([[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]]) @ turn.T
+    rays = np.concatenate([np.tile(inside, (6, 1)), ways], axis=1).astype(np.float32)
+    hit = np.isfinite(raycasting_scene(boxes).cast_rays(rays)["t_hit"].numpy())
+    assert hit.tolist() == [False, True, True, True, True, True]
+    assert shelf.ground.position[2] < -0.3
+
+
+def _pose(panel):
+    T = np.eye(4)
+    T[:3, :3], T[:3, 3] = rotation(panel.orientation), panel.position
+    return T
+
+
 def test_a_wall_stands_behind_what_the_camera_sees_and_moves_nothing(data):
     options = ("--scenes", 2, "--views", 1, "--elevation", 8, 20)
     for folder, more in (("bare", ()), ("walled", ("--wall",)), ("walled_again", ("--wall",))):
@@ -89,7 +136,9 @@ def test_a_wall_stands_behind_what_the_camera_sees_and_moves_nothing(data):
 @pytest.mark.parametrize(
     ("options", "told"),
     [
-        (("--bin", "--stack"), "exclude each other"),
+        (("--bin", "--stack"), "exclude one another"),
+        (("--bin", "--shelf"), "exclude one another"),
+        (("--wall", "--shelf"), "--wall takes --views 1"),
         (("--wall", "--bin"), "--wall takes --views 1"),
         (("--wall", "--views", 2), "--wall takes --views 1"),
     ],

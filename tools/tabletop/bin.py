@@ -3,19 +3,11 @@
 from __future__ import annotations
 
 import colorsys
-import json
-from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
-import trimesh
 
-from brrp_cli.errors import SceneError
-from tabletop.settle import TABLE, Panel, rotation
-
-# In the folder of a scene: the floor and the walls, boxes in the world.
-FILE = "bin.json"
+from tabletop.settle import TABLE, Panel
 
 # Ranges in metres, and of the walls' lean in degrees: from a shoe box to a tote.
 LENGTH, WIDTH, HEIGHT = (0.3, 0.6), (0.22, 0.4), (0.06, 0.22)
@@ -84,35 +76,3 @@ def draw_bin(rng: np.random.Generator) -> Bin:
         turn=float(rng.uniform(0, 2 * np.pi)),
         color=colorsys.hsv_to_rgb(hue, 0.9 * saturation, 0.15 + 0.75 * value),
     )
-
-
-def write_panels(panels: Sequence[Panel], folder: Path) -> None:
-    """Write a scene's bin, its floor first."""
-    entries = [
-        {
-            "position": panel.position.tolist(),
-            "orientation": np.asarray(panel.orientation).tolist(),
-            "half": panel.half.tolist(),
-        }
-        for panel in panels
-    ]
-    (folder / FILE).write_text(json.dumps(entries, indent=2) + "\n")
-
-
-def read_walls(folder: Path) -> list[trimesh.Trimesh]:
-    """The walls of a scene's bin, boxes, metres, world. Errors: SceneError for a scene without."""
-    path = folder / FILE
-    if not path.is_file():
-        raise SceneError(
-            "The scene has no bin",
-            where=path,
-            expected="a scene that tools/make_scenes.py made with --bin",
-            fix="make it anew, with the same options, --bin and --overwrite",
-        )
-    _, *walls = json.loads(path.read_text())
-    meshes = []
-    for wall in walls:
-        T = np.eye(4)
-        T[:3, :3], T[:3, 3] = rotation(np.array(wall["orientation"])), wall["position"]
-        meshes.append(trimesh.creation.box(2 * np.array(wall["half"]), T))
-    return meshes

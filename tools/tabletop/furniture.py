@@ -1,10 +1,19 @@
-"""What stands on the table and is background."""
+"""What stands on the table, or about it, and is background."""
 
 from __future__ import annotations
 
+import json
+from pathlib import Path
 from typing import Protocol
 
-from tabletop.settle import Panel
+import numpy as np
+import trimesh
+
+from brrp_cli.errors import SceneError
+from tabletop.settle import Panel, rotation
+
+# In the folder of a scene: of which kind it is, its floor and its walls, boxes in the world.
+FILE = "furniture.json"
 
 
 class Furniture(Protocol):
@@ -19,4 +28,38 @@ class Furniture(Protocol):
         """What lies beneath: the table, or a floor."""
 
     def panels(self) -> list[Panel]:
-        """Its boxes, metres, world."""
+        """Its boxes, metres, world; what objects stand on comes first, where it has that."""
+
+
+def write_furniture(furniture: Furniture, folder: Path) -> None:
+    """Write what objects of a scene stand in."""
+    panels = [
+        {
+            "position": panel.position.tolist(),
+            "orientation": np.asarray(panel.orientation).tolist(),
+            "half": panel.half.tolist(),
+        }
+        for panel in furniture.panels()
+    ]
+    record = {"kind": type(furniture).__name__.lower(), "panels": panels}
+    (folder / FILE).write_text(json.dumps(record, indent=2) + "\n")
+
+
+def read_walls(folder: Path) -> tuple[str, list[trimesh.Trimesh]]:
+    """The kind of a scene's furniture, and all of it but its floor: boxes, metres, world. Errors:
+    SceneError for a scene without."""
+    path = folder / FILE
+    if not path.is_file():
+        raise SceneError(
+            "The scene has no bin and no shelf",
+            where=path,
+            expected="a scene that tools/make_scenes.py made with --bin or --shelf",
+            fix="make it anew, with the same options, one of these and --overwrite",
+        )
+    record = json.loads(path.read_text())
+    meshes = []
+    for wall in record["panels"][1:]:
+        T = np.eye(4)
+        T[:3, :3], T[:3, 3] = rotation(np.array(wall["orientation"])), wall["position"]
+        meshes.append(trimesh.creation.box(2 * np.array(wall["half"]), T))
+    return record["kind"], meshes

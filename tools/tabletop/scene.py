@@ -15,7 +15,7 @@ from brrp_cli.errors import SceneError
 from brrp_cli.files import atomic_folder
 from brrp_cli.frames.published import depth_from_buffer, intrinsics_from_projection
 from brrp_cli.seeds import child_rng
-from tabletop.bin import Bin, draw_bin, write_panels
+from tabletop.bin import Bin, draw_bin
 from tabletop.camera import FAR, NEAR, Camera, Standpoint, draw_camera
 from tabletop.check import (
     CLEAN,
@@ -24,7 +24,7 @@ from tabletop.check import (
     check_measured_scene,
     check_scene,
 )
-from tabletop.furniture import Furniture
+from tabletop.furniture import Furniture, write_furniture
 from tabletop.light import draw_light, relight
 from tabletop.models import Model, load_model
 from tabletop.render import NOTHING, Picture, draw_look, render
@@ -124,7 +124,7 @@ def make_scene(plan: Plan, number: int, check: bool) -> list[Distance]:
         ]
         (partial / "objects.json").write_text(json.dumps(entries, indent=2) + "\n")
         if isinstance(furniture, Bin | Shelf):
-            write_panels(furniture.panels(), partial)
+            write_furniture(furniture, partial)
         for i, (camera, picture) in enumerate(zip(cameras, pictures, strict=True)):
             depth = picture.depth
             if plan.noise != "none":

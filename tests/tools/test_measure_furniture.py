@@ -1,4 +1,4 @@
-"""What the tool that measures bins says of made scenes, whose walls are known."""
+"""What the tool that measures bins and shelves says of made scenes, whose walls are known."""
 
 from __future__ import annotations
 
@@ -14,8 +14,10 @@ pytest.importorskip("pybullet")
 
 from click.testing import CliRunner
 from make_scenes import main as make_scenes
-from measure_bins import Found, count_grasps, face_points, in_view, line, main
-from tabletop.bin import FILE, draw_bin, read_walls, write_panels
+from measure_furniture import Found, bin_points, count_grasps, face_points, in_view, line, main
+from tabletop.bin import draw_bin
+from tabletop.furniture import FILE, read_walls, write_furniture
+from tabletop.shelf import draw_shelf
 
 from brrp_cli.config.grasping import GraspConfig
 from brrp_cli.geometry import similarity
@@ -26,21 +28,30 @@ FINGER = np.array([[0.045, 0.0, 0.1]])  # inside the right one of a hand that is
 
 
 @pytest.fixture(scope="module")
-def scenes(tmp_path_factory):
+def root(tmp_path_factory):
     root = tmp_path_factory.mktemp("data")
     for number, size in enumerate([(0.08, 0.06, 0.05), (0.05, 0.05, 0.09)]):
         path = root / "meshes" / f"{number}" / "google_16k" / "textured.obj"
         path.parent.mkdir(parents=True)
         trimesh.creation.box(size).export(path)
-    options = ["--scenes", 2, "--views", 1, "--elevation", 60, 80, "--bin", "--size", "320x240"]
-    arguments = ["--meshes", root / "meshes", "-o", root / "bins", *options]
+    return root
+
+
+def made(root, *options):
+    options = ["--scenes", 2, "--views", 1, "--size", "320x240", *options]
+    arguments = ["--meshes", root / "meshes", "-o", root / options[-1], *options]
     result = CliRunner().invoke(make_scenes, [str(each) for each in arguments])
     assert result.exit_code == 0, result.output
-    return root / "bins"
+    return root / options[-1]
+
+
+@pytest.fixture(scope="module")
+def scenes(root):
+    return made(root, "--elevation", 60, 80, "--bin")
 
 
 def said(monkeypatch, capsys, *arguments):
-    monkeypatch.setattr(sys, "argv", ["measure_bins.py", *map(str, arguments)])
+    monkeypatch.setattr(sys, "argv", ["measure_furniture.py", *map(str, arguments)])
     main()
     return capsys.readouterr().out
 
@@ -52,13 +63,21 @@ def test_walls_are_where_they_were_made(scenes, monkeypatch, capsys):
     assert off < 4.0
 
 
+def test_a_shelf_is_where_it_was_made(root, monkeypatch, capsys):
+    out = said(monkeypatch, capsys, made(root, "--elevation", 15, 25, "--shelf"))
+    assert "shelves 2/2" in out and "false 0/" in out
+    found, shown = map(int, out.partition("walls ")[2].split(",")[0].split("/"))
+    assert found >= 4 and shown <= 8
+    assert float(out.partition("off ")[2].split(" mm")[0]) < 4.0
+
+
 def test_walls_that_are_elsewhere_are_false(scenes, monkeypatch, capsys):
     path = sorted(scenes.glob(f"*/{FILE}"))[0]
     kept = path.read_text()
-    floor, *walls = json.loads(kept)
-    for wall in walls:
+    record = json.loads(kept)
+    for wall in record["panels"][1:]:
         wall["position"][2] += 1.0
-    path.write_text(json.dumps([floor, *walls]))
+    path.write_text(json.dumps(record))
     try:
         out = said(monkeypatch, capsys, scenes, "--scenes", 1)
     finally:
@@ -72,28 +91,42 @@ def test_scenes_without_a_bin_are_told(tmp_path, scenes, monkeypatch):
     for path in bare.glob(f"*/{FILE}"):
         path.unlink()
     for folder, what in ((tmp_path / "none", "none"), (bare, "has no bin")):
-        monkeypatch.setattr(sys, "argv", ["measure_bins.py", str(folder)])
+        monkeypatch.setattr(sys, "argv", ["measure_furniture.py", str(folder)])
         with pytest.raises(SystemExit, match=what):
             main()
 
 
-def test_a_bins_walls_are_read_as_they_were_written(tmp_path):
+def test_walls_are_read_as_they_were_written(tmp_path):
     made = draw_bin(np.random.default_rng(0))
-    write_panels(made.panels(), tmp_path)
-    walls = read_walls(tmp_path)
-    assert len(walls) == 4
+    write_furniture(made, tmp_path)
+    kind, walls = read_walls(tmp_path)
+    assert kind == "bin" and len(walls) == 4
     assert np.vstack([wall.vertices for wall in walls])[:, 2].max() == pytest.approx(
         made.height, abs=made.thickness
     )
+    shelf = draw_shelf(np.random.default_rng(0)).over(np.array([[0.0, 0.0, 0.3]]))
+    write_furniture(shelf, tmp_path)
+    kind, walls = read_walls(tmp_path)
+    assert kind == "shelf" and len(walls) == 4, "a back, two sides and a board above"
+    assert min(wall.bounds[0, 2] for wall in walls) == pytest.approx(-shelf.thickness)
 
 
-def test_points_of_a_wall_lie_in_its_middle():
+def test_points_of_a_bins_wall_lie_in_its_middle():
     rim = np.array([[0, 0.01, 1], [2, 0.01, 1], [0, -0.01, 1], [2, -0.01, 1.0]])
-    points = face_points(np.concatenate([rim, rim - [0, 0.1, 1]]))
+    points = bin_points(np.concatenate([rim, rim - [0, 0.1, 1]]))
     assert len(points) == 14
     np.testing.assert_allclose(points[:7, 1:], [[0, 1]] * 7, atol=1e-12)
     np.testing.assert_allclose(points[7:, 1:], [[-0.1, 0]] * 7, atol=1e-12)
     assert points[:, 0].min() == 0.25 and points[:, 0].max() == 1.75
+
+
+def test_points_of_a_slab_lie_on_its_face():
+    face = np.array([[0, 0, 0], [2, 0, 0], [2, 1, 0], [0, 1, 0.0]])
+    points = face_points(np.concatenate([face, face - [0, 0, 0.01]]))
+    np.testing.assert_allclose(points[0], [1, 0.5, 0])
+    np.testing.assert_allclose(
+        [points.min(axis=0), points.max(axis=0)], [[0.2, 0.1, 0], [1.8, 0.9, 0]]
+    )
 
 
 def test_a_wall_beside_the_image_is_not_asked_for():

@@ -1,13 +1,15 @@
-"""Where do bins' walls seem to be, and do hands keep out of the true ones?
+"""Where do walls of bins and shelves seem to be, and do hands keep out of the true ones?
 
-    python tools/measure_bins.py SCENES... [--prior PRIOR] [--scenes N]
+    python tools/measure_furniture.py SCENES... [--prior PRIOR] [--scenes N]
 
-For each set of scenes that `tools/make_scenes.py --bin` wrote, in the first view of each:
+For each set of scenes that `tools/make_scenes.py` wrote with `--bin` or `--shelf`, in the first
+view of each; true masks tell what the objects stand on:
 
-bins     scenes whose bin is found
-walls    walls that have a model, of those of which the image shows most (what is in front of
-         them does not count)
-off      median and 90 % of how far models lie from the true walls, at the rim and at the foot
+bins     or shelves: scenes in which one is found
+walls    walls, and boards above, that have a model, of those of which the image shows most (what is
+         in front of them does not count)
+off      median and 90 % of how far models lie from the true walls: of a bin at the rim and at the
+         foot, of a shelf the face that is seen
 false    models, of all, of which a part is more than 3 cm from any true wall; they are not in `off`
 
 With --prior, objects are reconstructed from true masks and grasps are planned (default hand):
@@ -29,21 +31,25 @@ import trimesh
 # The script also runs from a checkout that is not installed.
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from tabletop.bin import read_walls
+from tabletop.furniture import read_walls
 
+from brrp_cli.config import ObservationConfig
 from brrp_cli.config.segmentation import SegmentConfig
 from brrp_cli.errors import BrrpError
 from brrp_cli.geometry import transform_points
 from brrp_cli.grasping.grasp import GraspPlan
 from brrp_cli.grasping.plan import plan_grasps
 from brrp_cli.ground_truth.scenes import Scene, find_scenes
+from brrp_cli.observation.ray_samples import scene_plane
 from brrp_cli.prior.store import open_prior
 from brrp_cli.raycast import raycasting_scene
-from brrp_cli.segmentation.bin_walls import Wall, bin_walls
+from brrp_cli.segmentation.bin_walls import Solid
+from brrp_cli.segmentation.furniture import furniture
 from brrp_cli.session import Reconstructor
 
 FALSE = 0.03
 STEPS = 9
+KINDS = {"bin": "bins", "shelf": "shelves"}
 # Points on each true wall, against which hands are held.
 POINTS = 4_000
 
@@ -52,8 +58,9 @@ POINTS = 4_000
 class Found:
     """Counts over scenes; off : metres, of all faces of all walls."""
 
+    kind: str = "bin"
     scenes: int = 0
-    bins: int = 0
+    found: int = 0
     shown: int = 0
     modelled: int = 0
     models: int = 0
@@ -65,23 +72,31 @@ class Found:
     best_swept: int = 0
 
 
-def face_points(wall: Wall) -> np.ndarray:
+def bin_points(wall: Solid) -> np.ndarray:
     """Points (n, 3) of the middle of a wall, at its rim and its foot, without its ends."""
     share = np.linspace(0, 1, STEPS)[1:-1, None]
     rim, foot = wall[:4].reshape(2, 2, 3).mean(axis=0), wall[4:].reshape(2, 2, 3).mean(axis=0)
     return np.concatenate([(1 - share) * end[0] + share * end[1] for end in (rim, foot)])
 
 
+def face_points(slab: Solid) -> np.ndarray:
+    """Points (n, 3) of the face of a slab, without its ends."""
+    face, _ = np.split(slab, 2)
+    middle = face.mean(axis=0)
+    return np.concatenate([middle[None], middle + 0.8 * (face - middle)])
+
+
 def measure_walls(scene: Scene, walls: list[trimesh.Trimesh], found: Found) -> None:
     """Add how far models lie from the true walls, meshes in the camera frame."""
     frame = scene.view(0)
-    bins = bin_walls(frame, 0, SegmentConfig())
-    models = [wall for each in bins for wall in each]
+    around = furniture(frame, scene_plane(frame, ObservationConfig(), 0), 0, SegmentConfig())
+    models = [bin_points(wall) for each in around.bins for wall in each]
+    models += [face_points(slab) for slab in around.walls]
     found.scenes += 1
-    found.bins += bool(bins)
+    found.found += bool(models)
     own = set()
     for model in models:
-        points = face_points(model).astype(np.float32)
+        points = model.astype(np.float32)
         distances = [raycasting_scene([wall]).compute_distance(points).numpy() for wall in walls]
         off = np.min(distances, axis=0)
         if off.max() > FALSE:
@@ -119,7 +134,8 @@ def line(name: str, found: Found, planned: bool) -> str:
     """What is printed of a set."""
     off = 1000 * np.quantile(found.off, [0.5, 0.9]) if found.off else [np.nan] * 2
     text = (
-        f"{name}: bins {found.bins}/{found.scenes}, walls {found.modelled}/{found.shown},"
+        f"{name}: {KINDS[found.kind]} {found.found}/{found.scenes},"
+        f" walls {found.modelled}/{found.shown},"
         f" off {off[0]:.1f} mm (90 %: {off[1]:.1f}), false {found.false}/{found.models}"
     )
     if planned:
@@ -145,7 +161,8 @@ def main() -> None:
                 if frame.T_world_cam is None:
                     raise BrrpError("A view has no pose", where=scene.folder)
                 T_cam_world = np.linalg.inv(frame.T_world_cam)
-                walls = [wall.apply_transform(T_cam_world) for wall in read_walls(scene.folder)]
+                found.kind, walls = read_walls(scene.folder)
+                walls = [wall.apply_transform(T_cam_world) for wall in walls]
                 measure_walls(scene, walls, found)
                 if again is not None:
                     points = np.concatenate([wall.sample(POINTS, seed=0) for wall in walls])
