@@ -21,14 +21,12 @@ class Wall:
     """An upright plane at which a table ends.
 
     patch : what is seen of it; outside : whether the table lies behind it, as it does behind the
-    outer face of a shelf's side; spans : whether it goes along all of the table; whole : whether it
-    is one surface, and not the front edges of a shelf
+    outer face of a shelf's side; spans : whether it goes along all of the table
     """
 
     patch: Patch
     outside: bool
     spans: bool
-    whole: bool
 
     def holds(self, points: Array, near: float) -> NDArray[np.bool_]:
         """(...,) which of points (..., 3), metres, camera frame, are the wall or lie behind it:
@@ -66,6 +64,9 @@ def walls_of(
     for patch in patches:
         if abs(patch.plane.normal @ table.plane.normal) > np.sin(np.radians(config.square)):
             continue
+        # Front edges of a shelf are none: things reach through them.
+        if not patch.is_whole(points, support):
+            continue
         off = patch.plane.signed_distance(flat)
         # The corner itself is near to both.
         clear = off[np.abs(off) >= config.near]
@@ -76,8 +77,7 @@ def walls_of(
         rises = wall[table.plane.signed_distance(wall) > config.near]
         along = normalise(np.cross(table.plane.normal, patch.plane.normal))
         spans = _covers(rises @ along, flat @ along, config.cell) >= config.spans
-        whole = patch.is_whole(points, support)
-        found.append(Wall(patch, in_front < 0.5, spans, whole))
+        found.append(Wall(patch, in_front < 0.5, spans))
     return tuple(found)
 
 

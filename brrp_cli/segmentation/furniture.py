@@ -105,7 +105,7 @@ def _walls(
 ) -> list[Solid]:
     """A slab behind each face that is seen of what shuts a table off."""
     wall = config.table.wall
-    faces = [each.patch for each in table.walls if each.whole and each.spans]
+    faces = [each.patch for each in table.walls if each.spans]
     if table.board is not None:
         faces.append(table.board.patch)
     near = [np.abs(face.plane.signed_distance(points)) < wall.near for face in faces]
