@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from brrp_cli.config.observation import ObservationConfig, SupportConfig
 from brrp_cli.geometry import lengths
 from brrp_cli.hulls import in_hull
-from brrp_cli.observation.patches import Patch, largest_planes, patch_of
+from brrp_cli.observation.patches import Patch, Ransac, largest_planes, patch_of
 from brrp_cli.observation.support_plane import Plane, fit_plane
 from brrp_cli.seeds import child_rng, child_seed
 
@@ -38,10 +38,12 @@ def supporting_plane(
         near,
         child_seed(seed, "patches"),
         config.support,
-        tolerance=config.plane_tolerance,
-        iterations=config.plane_iterations,
-        drawn_points=config.plane_ransac_points,
-        min_points=config.plane_min_points,
+        Ransac(
+            config.plane_tolerance,
+            config.plane_iterations,
+            config.plane_ransac_points,
+            config.plane_min_points,
+        ),
         first=largest,
     )
     if len(planes) < 2:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -49,6 +49,21 @@ class Patch:
         return int(in_hull(self.hull, self.plan(crossing), -off).sum())
 
 
+@dataclass(frozen=True)
+class Ransac:
+    """What `largest_plane` asks for; tolerance in metres."""
+
+    tolerance: float
+    iterations: int
+    drawn_points: int
+    min_points: int
+
+    def drawing(self, part: float) -> Ransac:
+        """The same of a part of the points, as densely drawn."""
+        drawn = max(self.min_points, round(part * self.drawn_points))
+        return replace(self, drawn_points=drawn)
+
+
 def patch_of(plane: Plane, points: Points, tolerance: float, cell: float) -> Patch | None:
     """The patch of points (n, 3), metres, camera frame, that are nearer to a plane than
     `tolerance`, on a grid of `cell` metres; None where it has no extent."""
@@ -70,33 +85,30 @@ def largest_planes(
     points: NDArray[np.float64],
     seed: int,
     config: SupportConfig,
-    *,
-    tolerance: float,
+    ransac: Ransac,
     first: Plane | None = None,
-    **ransac: int,
 ) -> list[tuple[Plane, int]]:
     """The planes with most of points (n, 3), metres, camera frame, with their counts, most first.
 
-    They are found one after the other by `largest_plane`, which tells of the rest. first : of
-    them, where it is known.
+    They are found one after the other among the points that are left. first : of them, where it is
+    known
     """
     planes: list[tuple[Plane, int]] = []
     rest = points
     least = config.least * len(points)
-    density = ransac["drawn_points"] / max(len(points), 1)
     for index in range(config.candidates):
         # Where no second plane is large enough, the first is the table, and others are its things.
         enough = config.of_largest * planes[0][1] if index == 1 else 0.0
         if len(rest) < max(least, enough):
             break
-        plane = (
-            first
-            if first is not None and not index
-            else _largest(rest, child_seed(seed, "table", index), tolerance, ransac, density)
-        )
+        if first is not None and not index:
+            plane: Plane | None = first
+        else:
+            own = ransac.drawing(len(rest) / len(points))
+            plane = _largest(rest, child_seed(seed, "table", index), own)
         if plane is None:
             break
-        inlier = np.abs(plane.signed_distance(rest)) < tolerance
+        inlier = np.abs(plane.signed_distance(rest)) < ransac.tolerance
         if inlier.sum() < least:
             break
         planes.append((plane, int(inlier.sum())))
@@ -106,17 +118,13 @@ def largest_planes(
     return sorted(planes, key=lambda pair: -pair[1])
 
 
-def _largest(
-    points: NDArray[np.float64], seed: int, tolerance: float, ransac: dict[str, int], density: float
-) -> Plane | None:
-    """`largest_plane` of what is left of points, of which it draws as dense a part as of all."""
-    drawn = max(ransac["min_points"], round(density * len(points)))
-    model = largest_plane(points, seed, tolerance=tolerance, **{**ransac, "drawn_points": drawn})
+def _largest(points: NDArray[np.float64], seed: int, ransac: Ransac) -> Plane | None:
+    model = largest_plane(points, seed, **asdict(ransac))
     if model is None:
         return None
-    return (
-        Plane(model[:3], float(model[3])) if model[3] > 0 else Plane(-model[:3], -float(model[3]))
-    )
+    # The camera's side is positive.
+    model = model if model[3] > 0 else -model
+    return Plane(model[:3], float(model[3]))
 
 
 def _largest_patch(plan: NDArray[np.float64], cell: float) -> NDArray[np.float64]:

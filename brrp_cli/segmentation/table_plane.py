@@ -11,7 +11,7 @@ from brrp_cli.config.table import BinsConfig, TableConfig
 from brrp_cli.errors import FrameError
 from brrp_cli.hulls import beyond_hull, in_hull
 from brrp_cli.observation.borne import bearing
-from brrp_cli.observation.patches import largest_planes, patch_of
+from brrp_cli.observation.patches import Ransac, largest_planes, patch_of
 from brrp_cli.observation.support_plane import Plane
 from brrp_cli.observation.walls import Board, Wall, board_over, walls_of
 from brrp_cli.seeds import child_rng
@@ -90,9 +90,9 @@ def find_table(
 ) -> Table:
     """The support plane of points (n, 3), metres, camera frame; bins are not looked for.
 
-    The planes with most points are found one after the other (RANSAC). The table is the largest
-    that is no wall (observation/walls.py), or, where a floor is larger, a plane that lies well
-    above it, is parallel to it and has a good part of its points.
+    The planes with most points are found one after the other (RANSAC). The table is the largest,
+    or, where a floor is larger, a plane that lies well above it, is parallel to it and has a good
+    part of its points; or that one on which most stands (observation/borne.py).
 
     source : for messages. Errors: FrameError if no plane holds `config.least` of the points.
     """
@@ -103,10 +103,7 @@ def find_table(
         np.asarray(points, dtype=np.float64),
         seed,
         config.support,
-        tolerance=config.tolerance,
-        iterations=config.iterations,
-        drawn_points=config.ransac_points,
-        min_points=config.min_points,
+        Ransac(config.tolerance, config.iterations, config.ransac_points, config.min_points),
     )
     if not planes or planes[0][1] < config.least * len(points):
         raise FrameError(

@@ -13,7 +13,7 @@ from brrp_cli.config.observation import SupportConfig
 from brrp_cli.config.segmentation import SegmentConfig
 from brrp_cli.geometry import transform_points
 from brrp_cli.observation.borne import bearing, standing_on
-from brrp_cli.observation.patches import largest_planes, patch_of
+from brrp_cli.observation.patches import Ransac, largest_planes, patch_of
 from brrp_cli.observation.ray_samples import scene_plane
 from brrp_cli.observation.support_plane import Plane
 from brrp_cli.segmentation.table_plane import find_table
@@ -105,11 +105,11 @@ def test_planes_come_with_the_most_points_first_and_small_ones_are_left():
     sizes = {1.0: 0.8, 0.7: 0.5, 0.4: 0.1}
     points = np.concatenate([square(z, size) for z, size in sizes.items()])
     points[:, 2] += 0.001 * rng.normal(size=len(points))
-    ransac = {"tolerance": 0.01, "iterations": 200, "drawn_points": 2000, "min_points": 50}
-    found = largest_planes(points, 0, CONFIG, **ransac)
+    ransac = Ransac(0.01, 200, 2000, 50)
+    found = largest_planes(points, 0, CONFIG, ransac)
     assert [round(plane.offset, 2) for plane, _ in found] == [1.0, 0.7]
     only = np.concatenate([square(1.0, 0.8), square(0.7, 0.2)])
-    assert len(largest_planes(only, 0, CONFIG, **ransac)) == 1, "no second that could be the table"
+    assert len(largest_planes(only, 0, CONFIG, ransac)) == 1, "no second that could be the table"
 
 
 def test_a_shelf_is_what_its_scene_says():
