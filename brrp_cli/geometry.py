@@ -13,6 +13,9 @@ Array = NDArray[np.floating]
 # Cells of a grid for each point, up to which they are counted.
 _COUNTED = 4
 
+# Up in the image, where no table says it: cameras look along z, with y down.
+IMAGE_UP = np.array([0.0, -1.0, 0.0])
+
 
 def transform_points(T_target_source: Array, points: Array) -> Array:
     """Points (..., 3) in the source frame, given in the target frame."""

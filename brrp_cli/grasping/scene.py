@@ -14,7 +14,7 @@ from brrp_cli.config.segmentation import SegmentConfig
 from brrp_cli.config.tables import changed
 from brrp_cli.errors import ResultError
 from brrp_cli.frames.frame import Frame
-from brrp_cli.geometry import transform_points
+from brrp_cli.geometry import IMAGE_UP, transform_points
 from brrp_cli.grasping.standing_around import standing_around
 from brrp_cli.observation.support_plane import Plane
 from brrp_cli.reconstruction import OccupancyPosterior, Reconstruction
@@ -23,8 +23,6 @@ from brrp_cli.segmentation.bin_walls import Solid
 from brrp_cli.segmentation.furniture import furniture, segmentation_of
 
 Array = NDArray[np.float64]
-# Up in the image, where no table says it.
-IMAGE_UP = np.array([0.0, -1.0, 0.0])
 
 
 @dataclass(frozen=True)

@@ -8,15 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brrp_cli.config.observation import ObservationConfig, SupportConfig
-from brrp_cli.geometry import lengths
+from brrp_cli.geometry import IMAGE_UP, lengths
 from brrp_cli.hulls import in_hull
 from brrp_cli.observation.patches import Patch, Ransac, largest_planes, patch_of
 from brrp_cli.observation.support_plane import Plane, fit_plane
 from brrp_cli.seeds import child_rng, child_seed
 
 Points = NDArray[np.floating]
-
-IMAGE_UP = np.array([0.0, -1.0, 0.0])
 
 
 def supporting_plane(

@@ -82,7 +82,11 @@ def walls_of(
 
 
 def board_over(
-    table: Patch, patches: Sequence[Patch], points: Array, config: WallConfig
+    table: Patch,
+    patches: Sequence[Patch],
+    points: Array,
+    config: WallConfig,
+    support: SupportConfig,
 ) -> Board | None:
     """The lowest of the patches that cover the table as the next board of a shelf does.
 
@@ -93,6 +97,8 @@ def board_over(
     for patch in patches:
         alike = patch.plane.normal @ table.plane.normal
         if patch is table or abs(alike) < np.cos(np.radians(config.square)):
+            continue
+        if not patch.is_whole(points, support):
             continue
         near = points[np.abs(patch.plane.signed_distance(points)) < config.near]
         height = float(np.median(table.plane.signed_distance(near))) if len(near) else 0.0

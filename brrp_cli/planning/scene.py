@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from brrp_cli.completion.completed_mean import empty_space
 from brrp_cli.config import MeanConfig
 from brrp_cli.errors import ResultError
-from brrp_cli.geometry import similarity, transform_points
+from brrp_cli.geometry import IMAGE_UP, similarity, transform_points
 from brrp_cli.observation.support_plane import Plane
 from brrp_cli.planning.body import Body, body_axes, body_pose, mass_and_inertia
 from brrp_cli.planning.mjcf import Table
@@ -27,7 +27,6 @@ if TYPE_CHECKING:
 
 # Of the table: metres beyond the objects' corners, and from its top to its lower side.
 TABLE_MARGIN, TABLE_THICKNESS = 0.25, 0.02
-IMAGE_UP = np.array([0.0, -1.0, 0.0])
 
 
 @dataclass(frozen=True)

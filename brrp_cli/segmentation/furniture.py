@@ -14,7 +14,7 @@ from brrp_cli.config.segmentation import SegmentConfig
 from brrp_cli.config.tables import changed
 from brrp_cli.errors import ConfigError, FrameError
 from brrp_cli.frames.frame import BACKGROUND, Frame
-from brrp_cli.geometry import backproject
+from brrp_cli.geometry import backproject, transform_points
 from brrp_cli.observation.patches import Patch
 from brrp_cli.observation.support_plane import Plane
 from brrp_cli.segmentation.bin_walls import Solid, bins_of
@@ -41,12 +41,9 @@ class Furniture:
 
     def moved(self, T: Array) -> Furniture:
         """In another frame, by a rigid T (4, 4)."""
-
-        def move(corners: Solid) -> Solid:
-            return np.asarray(corners @ T[:3, :3].T + T[:3, 3])
-
         return Furniture(
-            [[move(wall) for wall in each] for each in self.bins], [*map(move, self.walls)]
+            [[transform_points(T, wall) for wall in each] for each in self.bins],
+            [transform_points(T, wall) for wall in self.walls],
         )
 
     @property

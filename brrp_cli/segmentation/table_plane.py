@@ -129,7 +129,7 @@ def find_table(
         table.axes,
         table.hull,
         walls=walls_of(table, found, points, config.wall, config.support),
-        board=board_over(table, found, points, config.wall),
+        board=board_over(table, found, points, config.wall, config.support),
     )
 
 
