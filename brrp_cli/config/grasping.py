@@ -15,12 +15,16 @@ class SurroundingsConfig:
     rises : what is lower over the table is the table; reach : of what is farther from all objects a
     hand cannot get to; beside : what is nearer to an object may be depth that bled from it; cell :
     of the grid that they are thinned on
+    angle : tangent between cells of the image in which they hide what is behind; behind : metres
+    along z from them to there
     """
 
     rises: float = 0.02
     reach: float = 0.25
     beside: float = 0.02
     cell: float = 0.008
+    angle: float = 0.015
+    behind: float = 0.02
 
 
 @dataclass(frozen=True)

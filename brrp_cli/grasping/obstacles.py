@@ -17,18 +17,23 @@ from brrp_cli.dependencies import import_library
 from brrp_cli.grasping.closing import runs_into
 from brrp_cli.grasping.draws import Mesh, mesh_alone
 from brrp_cli.grasping.gripper import Gripper
+from brrp_cli.grasping.hidden_space import HiddenSpace
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
+# Points of a box along each axis that are held against hidden space.
+INSIDE = (3, 2, 10)
+
 
 @dataclass(frozen=True)
 class Obstacles:
-    """What stands around one object: closed meshes and loose points (n, 3), metres, camera
-    frame."""
+    """What stands around one object: closed meshes and loose points (n, 3), metres, camera frame,
+    and the space that nobody sees."""
 
     meshes: list[Mesh]
     loose: Array
+    hidden: HiddenSpace
 
     def probably_hits(
         self, T_cam_gripper: Array, openings: Array, gripper: Gripper, config: GraspConfig
@@ -44,6 +49,11 @@ class Obstacles:
                 found[near] = runs_into(alone, T, wide, gripper, config, inset=config.inset)[0]
         if len(self.loose):
             found |= _hold_points(self.loose, T_cam_gripper, openings, gripper, config)
+        if self.hidden.depth.size:
+            boxes = gripper.boxes(openings, config.approach)
+            swept = _points_within(boxes) @ np.swapaxes(T_cam_gripper[:, :3, :3], 1, 2)
+            swept += T_cam_gripper[:, None, :3, 3]
+            found |= self.hidden.holds(swept).any(axis=1)
         return found
 
     def hits(
@@ -89,6 +99,15 @@ def _touch(vertices: Array, faces: NDArray[np.int64], box: Array, inset: float) 
     model.endModel()
     part = fcl.CollisionObject(fcl.Box(*(high - low)), fcl.Transform((low + high) / 2))
     return bool(fcl.collide(part, fcl.CollisionObject(model)))
+
+
+def _points_within(boxes: Array) -> Array:
+    """(n, k, 3) points of boxes (n, b, 2, 3), from side to side and more along z."""
+    shares = [np.linspace(0, 1, count) for count in INSIDE]
+    share = np.stack(np.meshgrid(*shares, indexing="ij"), axis=-1).reshape(-1, 3)
+    low, high = boxes[:, :, None, 0], boxes[:, :, None, 1]
+    count = boxes.shape[1] * len(share)
+    return np.asarray((low + share * (high - low)).reshape(len(boxes), count, 3))
 
 
 def _hold_points(

@@ -124,7 +124,7 @@ def _plan_object(task: _Task) -> ObjectGrasps:
     poses, clear = lifted_off(poses, scene.plane, gripper, config)
     poses = _kept(poses, clear, fell, "table")
     others = [shape for i, shape in enumerate(task.shapes) if i != task.number]
-    obstacles = Obstacles(others, _some(scene.loose, config.loose))
+    obstacles = Obstacles(others, _some(scene.loose, config.loose), scene.hidden)
     hit = obstacles.probably_hits(poses.T, poses.openings, gripper, config)
     poses = _kept(poses, ~hit, fell, "neighbour")
     poses = _most_promising(item, own, poses, gripper, config, fell)

@@ -15,6 +15,7 @@ from brrp_cli.config.tables import changed
 from brrp_cli.errors import ResultError
 from brrp_cli.frames.frame import Frame
 from brrp_cli.geometry import IMAGE_UP, transform_points
+from brrp_cli.grasping.hidden_space import HiddenSpace, hidden_behind
 from brrp_cli.grasping.standing_around import standing_around
 from brrp_cli.observation.support_plane import Plane
 from brrp_cli.reconstruction import OccupancyPosterior, Reconstruction
@@ -23,6 +24,9 @@ from brrp_cli.segmentation.bin_walls import Solid
 from brrp_cli.segmentation.furniture import furniture, segmentation_of
 
 Array = NDArray[np.float64]
+
+
+NOTHING_HIDDEN = hidden_behind(np.zeros((0, 3)), SurroundingsConfig())
 
 
 @dataclass(frozen=True)
@@ -42,7 +46,7 @@ class GraspScene:
     """objects : those that have a mesh; plane : the table, camera frame; without : why others have
     none, by id; loose : (n, 3) observed points of those, and of what stands around; surface : how
     meshes were made; walls : corners (k, 3), convex, of the walls of bins and of what shuts the
-    table off, camera frame"""
+    table off, camera frame; hidden : behind what stands around"""
 
     objects: list[GraspObject]
     plane: Plane | None
@@ -50,6 +54,7 @@ class GraspScene:
     loose: Array
     surface: SurfaceConfig
     walls: Sequence[Solid] = ()
+    hidden: HiddenSpace = NOTHING_HIDDEN
 
     @property
     def up(self) -> Array:
@@ -98,9 +103,9 @@ def _stored(stored: StoredResult, around: SurroundingsConfig) -> GraspScene:
         if item["mesh"] is None
     }
     plane, masks = stored.plane_cam, segmentation_of(stored.record["segmentation"])
-    loose = _loose(stored.frame, plane, objects, without, around, masks)
+    loose, hidden = _loose(stored.frame, plane, objects, without, around, masks)
     walls = furniture(stored.frame, plane, stored.record["seed"], masks).solids
-    return GraspScene(objects, plane, without, loose, stored.surface_config, walls)
+    return GraspScene(objects, plane, without, loose, stored.surface_config, walls, hidden)
 
 
 def _computed(result: Reconstruction, around: SurroundingsConfig) -> GraspScene:
@@ -117,11 +122,11 @@ def _computed(result: Reconstruction, around: SurroundingsConfig) -> GraspScene:
     ]
     without = {o.object_id: o.message or o.status for o in result.objects if o.surface is None}
     masks = segmentation_of(result.segmentation)
-    loose = _loose(result.frame, result.plane, objects, without, around, masks)
+    loose, hidden = _loose(result.frame, result.plane, objects, without, around, masks)
     table = result.configuration.get("surface", {})
     surface = changed(SurfaceConfig(), table, "the reconstruction", "surface.")
     walls = furniture(result.frame, result.plane, result.seed, masks).solids
-    return GraspScene(objects, result.plane, without, loose, surface, walls)
+    return GraspScene(objects, result.plane, without, loose, surface, walls, hidden)
 
 
 def _loose(
@@ -131,13 +136,14 @@ def _loose(
     without: dict[int, str],
     config: SurroundingsConfig,
     masks: SegmentConfig,
-) -> Array:
-    """(n, 3) observed points that a hand keeps out of: of objects without a mesh, and of none."""
+) -> tuple[Array, HiddenSpace]:
+    """(n, 3) observed points that a hand keeps out of, of objects without a mesh and of none, and
+    the space behind the latter."""
     clouds = [frame.object_points(i) for i in without]
     surfaces = [each for item in objects for each in (item.vertices, item.observed)]
     known = _joined([*surfaces, *clouds])
     around = standing_around(frame, plane, known, config, masks.smooth_depth)
-    return _joined([*clouds, around])
+    return _joined([*clouds, around]), hidden_behind(around, config)
 
 
 def _joined(clouds: list[NDArray[np.floating]]) -> Array:

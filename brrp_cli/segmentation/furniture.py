@@ -41,9 +41,12 @@ class Furniture:
 
     def moved(self, T: Array) -> Furniture:
         """In another frame, by a rigid T (4, 4)."""
+
+        def move(corners: Solid) -> Solid:
+            return np.asarray(transform_points(T, corners), dtype=np.float64)
+
         return Furniture(
-            [[transform_points(T, wall) for wall in each] for each in self.bins],
-            [transform_points(T, wall) for wall in self.walls],
+            [[move(wall) for wall in walls] for walls in self.bins], [*map(move, self.walls)]
         )
 
     @property

@@ -17,7 +17,7 @@ from brrp_cli.grasping.draws import Mesh, draw_surfaces, mesh_alone
 from brrp_cli.grasping.gripper_file import open_gripper
 from brrp_cli.grasping.obstacles import Obstacles
 from brrp_cli.grasping.plan import plan_grasps
-from brrp_cli.grasping.scene import GraspObject, GraspScene
+from brrp_cli.grasping.scene import NOTHING_HIDDEN, GraspObject, GraspScene
 from brrp_cli.observation.support_plane import Plane
 from brrp_cli.physics import GRAVITY
 from brrp_cli.raycast import raycasting_scene
@@ -122,7 +122,9 @@ def test_a_neighbour_takes_the_side_that_it_blocks():
 def test_what_rays_miss_is_found_exactly():
     """A needle between the rays of a hand that comes straight down."""
     needle = trimesh.creation.box((0.0004, 0.0004, 0.05)).apply_translation([0.033, 0.003, 0.02])
-    around = Obstacles([Mesh(np.asarray(needle.vertices), np.asarray(needle.faces))], NOTHING)
+    around = Obstacles(
+        [Mesh(np.asarray(needle.vertices), np.asarray(needle.faces))], NOTHING, NOTHING_HIDDEN
+    )
     T = np.diag([1.0, -1.0, -1.0, 1.0])
     T[2, 3] = FRANKA.tip + 0.005
     config = GraspConfig()
