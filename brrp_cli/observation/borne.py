@@ -78,7 +78,14 @@ def bearing(
     whole = [each for each in patches if each.is_whole(points, config)]
     # What goes through a heap tells no directions.
     main = usual if _holds(whole, usual) else max(whole, key=lambda e: e.count, default=usual)
-    large = [e for e in whole if e is main or _is_furniture(e, main, points, config)]
+    large: list[Patch] = []
+    for each in sorted(whole, key=lambda e: -e.count):
+        # What lies a little over a larger one is faces of what stands on that.
+        if each is main or (
+            _is_furniture(each, main, points, config)
+            and all(_are_apart(each, other, points, config) for other in large)
+        ):
+            large.append(each)
     if things is None:
         things = _off_all(large, points, config.off)
     bears = {id(each): _bears(each, things, config) for each in large}
@@ -109,10 +116,17 @@ def _is_furniture(patch: Patch, usual: Patch, points: Points, config: SupportCon
     alike = abs(patch.plane.normal @ usual.plane.normal)
     if patch.across < config.across:
         return False
-    if not _are_parallel(patch, usual, config):
-        return bool(alike < np.sin(np.radians(config.turn)))
+    square = alike < np.sin(np.radians(config.turn))
+    parallel = _are_parallel(patch, usual, config) and _are_apart(patch, usual, points, config)
+    return bool(square or parallel)
+
+
+def _are_apart(patch: Patch, other: Patch, points: Points, config: SupportConfig) -> bool:
+    """Whether a patch is not parallel and near to another one."""
+    if not _are_parallel(patch, other, config):
+        return True
     on = points[np.abs(patch.plane.signed_distance(points)) < config.off]
-    return float(np.median(np.abs(usual.plane.signed_distance(on)))) > config.apart
+    return float(np.median(np.abs(other.plane.signed_distance(on)))) > config.apart
 
 
 def _are_parallel(one: Patch, other: Patch, config: SupportConfig) -> bool:

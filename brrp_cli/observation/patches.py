@@ -99,7 +99,7 @@ def largest_planes(
     for index in range(config.candidates):
         # Where no second plane is large enough, the first is the table, and others are its things.
         enough = config.of_largest * planes[0][1] if index == 1 else 0.0
-        if len(rest) < max(least, enough):
+        if not len(rest) or len(rest) < max(least, enough):
             break
         if first is not None and not index:
             plane: Plane | None = first

@@ -116,3 +116,19 @@ def test_a_shelf_is_what_its_scene_says():
     """What the other tests stand on: the things fit in."""
     highest = max(mesh.bounds[1, 2] for mesh in THINGS)
     assert highest < HEIGHT and max(np.abs(m.bounds[:, 0]).max() for m in THINGS) < DEPTH / 2
+
+
+def test_what_lies_a_little_over_a_board_is_no_board():
+    """Books on the lower board, seen before a larger wall that bears nothing."""
+    board, books = square(1.0, 0.8), square(0.95, 0.4)
+    board = board[np.abs(board[:, :2]).max(axis=1) > 0.2 / 0.95]
+    on_books = square(0.93, 0.3)
+    wall = square(1.0, 1.2)[:, [2, 1, 0]] * [-0.7, 1, 1] + [0, 0, 0.8]
+    points = np.concatenate([board, books, on_books, wall])
+    upright = patch_of(Plane(np.array([1.0, 0.0, 0.0]), 0.7), wall, 0.01, 0.02)
+    patches = [upright, facing(1.0, board), facing(0.95, books)]
+    assert upright.count > patches[1].count > patches[2].count
+    assert bearing(patches, upright, points, np.concatenate([on_books, books]), CONFIG) in (
+        upright,
+        patches[1],
+    )
