@@ -16,7 +16,8 @@ class SurroundingsConfig:
     hand cannot get to; beside : what is nearer to an object may be depth that bled from it; cell :
     of the grid that they are thinned on
     angle : tangent between cells of the image in which they hide what is behind; behind : metres
-    along z from them to there
+    along z from them to there; across, along : points of a part of a hand from side to side, and
+    along its fingers, that are held against that
     """
 
     rises: float = 0.02
@@ -25,6 +26,8 @@ class SurroundingsConfig:
     cell: float = 0.008
     angle: float = 0.015
     behind: float = 0.02
+    across: int = between(3, 2, 100)
+    along: int = between(10, 2, 100)
 
 
 @dataclass(frozen=True)

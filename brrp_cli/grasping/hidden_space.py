@@ -48,3 +48,6 @@ def hidden_behind(around: Array, config: SurroundingsConfig) -> HiddenSpace:
     depth = np.full((height, width), np.inf)
     np.minimum.at(depth, (at[:, 1], at[:, 0]), around[:, 2] + config.behind)
     return HiddenSpace(depth, first, config.angle)
+
+
+NOTHING_HIDDEN = hidden_behind(np.zeros((0, 3)), SurroundingsConfig())

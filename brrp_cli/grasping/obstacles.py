@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from brrp_cli.config.grasping import GraspConfig
+from brrp_cli.config.grasping import GraspConfig, SurroundingsConfig
 from brrp_cli.dependencies import import_library
 from brrp_cli.grasping.closing import runs_into
 from brrp_cli.grasping.draws import Mesh, mesh_alone
@@ -21,9 +21,6 @@ from brrp_cli.grasping.hidden_space import HiddenSpace
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
-
-# Points of a box along each axis that are held against hidden space.
-INSIDE = (3, 2, 10)
 
 
 @dataclass(frozen=True)
@@ -51,7 +48,9 @@ class Obstacles:
             found |= _hold_points(self.loose, T_cam_gripper, openings, gripper, config)
         if self.hidden.depth.size:
             boxes = gripper.boxes(openings, config.approach)
-            swept = _points_within(boxes) @ np.swapaxes(T_cam_gripper[:, :3, :3], 1, 2)
+            swept = _points_within(boxes, config.surroundings) @ np.swapaxes(
+                T_cam_gripper[:, :3, :3], 1, 2
+            )
             swept += T_cam_gripper[:, None, :3, 3]
             found |= self.hidden.holds(swept).any(axis=1)
         return found
@@ -101,9 +100,10 @@ def _touch(vertices: Array, faces: NDArray[np.int64], box: Array, inset: float) 
     return bool(fcl.collide(part, fcl.CollisionObject(model)))
 
 
-def _points_within(boxes: Array) -> Array:
-    """(n, k, 3) points of boxes (n, b, 2, 3), from side to side and more along z."""
-    shares = [np.linspace(0, 1, count) for count in INSIDE]
+def _points_within(boxes: Array, config: SurroundingsConfig) -> Array:
+    """(n, k, 3) points of boxes (n, b, 2, 3), from end to end."""
+    counts = (config.across, config.across, config.along)
+    shares = [np.linspace(0, 1, count) for count in counts]
     share = np.stack(np.meshgrid(*shares, indexing="ij"), axis=-1).reshape(-1, 3)
     low, high = boxes[:, :, None, 0], boxes[:, :, None, 1]
     count = boxes.shape[1] * len(share)

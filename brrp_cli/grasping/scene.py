@@ -15,7 +15,7 @@ from brrp_cli.config.tables import changed
 from brrp_cli.errors import ResultError
 from brrp_cli.frames.frame import Frame
 from brrp_cli.geometry import IMAGE_UP, transform_points
-from brrp_cli.grasping.hidden_space import HiddenSpace, hidden_behind
+from brrp_cli.grasping.hidden_space import NOTHING_HIDDEN, HiddenSpace, hidden_behind
 from brrp_cli.grasping.standing_around import standing_around
 from brrp_cli.observation.support_plane import Plane
 from brrp_cli.reconstruction import OccupancyPosterior, Reconstruction
@@ -24,9 +24,6 @@ from brrp_cli.segmentation.bin_walls import Solid
 from brrp_cli.segmentation.furniture import furniture, segmentation_of
 
 Array = NDArray[np.float64]
-
-
-NOTHING_HIDDEN = hidden_behind(np.zeros((0, 3)), SurroundingsConfig())
 
 
 @dataclass(frozen=True)

@@ -15,9 +15,10 @@ from brrp_cli.errors import BrrpError
 from brrp_cli.grasping.closing import Closed, close_on
 from brrp_cli.grasping.draws import Mesh, draw_surfaces, mesh_alone
 from brrp_cli.grasping.gripper_file import open_gripper
+from brrp_cli.grasping.hidden_space import NOTHING_HIDDEN
 from brrp_cli.grasping.obstacles import Obstacles
 from brrp_cli.grasping.plan import plan_grasps
-from brrp_cli.grasping.scene import NOTHING_HIDDEN, GraspObject, GraspScene
+from brrp_cli.grasping.scene import GraspObject, GraspScene
 from brrp_cli.observation.support_plane import Plane
 from brrp_cli.physics import GRAVITY
 from brrp_cli.raycast import raycasting_scene

@@ -10,15 +10,13 @@ import numpy as np
 import pytest
 import trimesh
 import yaml
-from click.testing import CliRunner
-from made_result import BOX, write_made_result
+from exported import exported, swept
+from made_result import BOX
 from moveit_messages import message, read_scene
-from table_scene import T_CAM_WORLD, in_camera
 
 from brrp_cli.api import open_result
-from brrp_cli.cli import main
 from brrp_cli.geometry import transform_points
-from brrp_cli.grasping.grasp import GraspPlan
+from brrp_cli.grasping.hidden_space import NOTHING_HIDDEN
 from brrp_cli.grasping.plan import plan_grasps
 from brrp_cli.grasping.scene import scene_of
 from brrp_cli.shapes import solids
@@ -34,21 +32,10 @@ def bin_mesh() -> trimesh.Trimesh:
     return solids.moved(solids.difference(outer, hollow), x=MIDDLE[0], y=MIDDLE[1])
 
 
-def run(*arguments: object) -> str:
-    result = CliRunner().invoke(main, [*map(str, arguments)])
-    assert result.exit_code == 0, result.output
-    return result.output
-
-
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory) -> Path:
     pytest.importorskip("mujoco")
-    around = in_camera(bin_mesh(), T_CAM_WORLD)
-    results = write_made_result(
-        tmp_path_factory.mktemp("made") / "out", frame="world", unmasked=around
-    )
-    run("export", results, "--collision", "hull", "--moveit")
-    return results / "plan"
+    return exported(tmp_path_factory.mktemp("made"), bin_mesh())
 
 
 def on_the_walls(points: np.ndarray) -> bool:
@@ -108,25 +95,13 @@ def test_in_the_simulator_they_stand_still_and_hold_what_is_pushed(folder):
     assert inner < body.xpos[0] < inner + 0.06
 
 
-def swept(plan: GraspPlan) -> int:
-    """How many hands reach into the true walls."""
-    points = transform_points(T_CAM_WORLD, bin_mesh().sample(20_000, seed=0))
-    count = 0
-    for item in plan.objects:
-        for grasp in item.grasps:
-            local = transform_points(np.linalg.inv(grasp.T_cam_gripper), points)
-            boxes = plan.gripper.boxes(np.array([grasp.opening]), plan.config.approach)[0]
-            inside = (local[None] >= boxes[:, None, 0]) & (local[None] <= boxes[:, None, 1])
-            count += bool(inside.all(axis=-1).any())
-    return count
-
-
 def test_hands_keep_out_of_walls_that_nothing_shows(folder):
-    scene = replace(scene_of(open_result(folder.parent)), loose=np.zeros((0, 3)))
+    scene = scene_of(open_result(folder.parent))
+    scene = replace(scene, loose=np.zeros((0, 3)), hidden=NOTHING_HIDDEN)
     among, without = (
         plan_grasps(each, per_object=20, min_score=0.0)
         for each in (scene, replace(scene, walls=()))
     )
     assert len(scene.walls) == 4
     assert {item.object_id for item in among.objects if item.grasps} >= {BOX}
-    assert swept(among) == 0 < swept(without)
+    assert swept(among, bin_mesh()) == 0 < swept(without, bin_mesh())

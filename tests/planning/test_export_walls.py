@@ -10,14 +10,12 @@ import numpy as np
 import pytest
 import trimesh
 import yaml
-from click.testing import CliRunner
-from made_result import write_made_result
+from exported import exported, swept
 from moveit_messages import message, read_scene
-from table_scene import T_CAM_WORLD, in_camera
 
 from brrp_cli.api import open_result
-from brrp_cli.cli import main
 from brrp_cli.geometry import transform_points
+from brrp_cli.grasping.hidden_space import NOTHING_HIDDEN
 from brrp_cli.grasping.plan import plan_grasps
 from brrp_cli.grasping.scene import scene_of
 
@@ -31,22 +29,10 @@ def wall_mesh() -> trimesh.Trimesh:
     return wall.apply_transform(trimesh.transformations.rotation_matrix(YAW, [0, 0, 1]))
 
 
-def run(*arguments: object) -> str:
-    result = CliRunner().invoke(main, [*map(str, arguments)])
-    assert result.exit_code == 0, result.output
-    return result.output
-
-
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory) -> Path:
     pytest.importorskip("mujoco")
-    results = write_made_result(
-        tmp_path_factory.mktemp("made") / "out",
-        frame="world",
-        unmasked=in_camera(wall_mesh(), T_CAM_WORLD),
-    )
-    run("export", results, "--collision", "hull", "--moveit")
-    return results / "plan"
+    return exported(tmp_path_factory.mktemp("made"), wall_mesh())
 
 
 def on_the_wall(points: np.ndarray) -> bool:
@@ -90,17 +76,19 @@ def test_it_cannot_move_in_the_simulator_and_the_table_does_not_grow_with_it(fol
 def test_hands_keep_out_of_it(folder):
     scene = scene_of(open_result(folder.parent))
     assert len(scene.walls) == 1
-    blind = replace(scene, loose=np.zeros((0, 3)))
-    points = transform_points(T_CAM_WORLD, wall_mesh().sample(40_000, seed=0))
+    blind = replace(scene, loose=np.zeros((0, 3)), hidden=NOTHING_HIDDEN)
+    among, without = (
+        plan_grasps(each, per_object=20, min_score=0.0)
+        for each in (blind, replace(blind, walls=()))
+    )
+    assert swept(among, wall_mesh()) == 0 < swept(without, wall_mesh())
 
-    def swept(walls) -> int:
-        plan = plan_grasps(replace(blind, walls=walls), per_object=20, min_score=0.0)
-        count = 0
-        for grasp in (grasp for item in plan.objects for grasp in item.grasps):
-            local = transform_points(np.linalg.inv(grasp.T_cam_gripper), points)
-            boxes = plan.gripper.boxes(np.array([grasp.opening]), plan.config.approach)[0]
-            inside = (local[None] >= boxes[:, None, 0]) & (local[None] <= boxes[:, None, 1])
-            count += bool(inside.all(axis=-1).any())
-        return count
 
-    assert swept(scene.walls) == 0 < swept(())
+def test_nor_do_they_go_behind_it(folder):
+    """By what it hides alone."""
+    scene = replace(scene_of(open_result(folder.parent)), loose=np.zeros((0, 3)), walls=())
+    seen, blind = (
+        plan_grasps(each, per_object=20, min_score=0.0)
+        for each in (scene, replace(scene, hidden=NOTHING_HIDDEN))
+    )
+    assert swept(seen, wall_mesh()) < swept(blind, wall_mesh())

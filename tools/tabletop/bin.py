@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import colorsys
 from dataclasses import dataclass
 
 import numpy as np
 
+from tabletop.furniture import any_color
 from tabletop.settle import TABLE, Panel
 
 # Ranges in metres, and of the walls' lean in degrees: from a shoe box to a tote.
@@ -66,7 +66,7 @@ class Bin:
 
 def draw_bin(rng: np.random.Generator) -> Bin:
     """A bin of any size, colour and direction."""
-    hue, saturation, value = rng.random(3)
+    color = any_color(rng)
     return Bin(
         length=float(rng.uniform(*LENGTH)),
         width=float(rng.uniform(*WIDTH)),
@@ -74,5 +74,5 @@ def draw_bin(rng: np.random.Generator) -> Bin:
         thickness=float(rng.uniform(*THICKNESS)),
         lean=float(np.deg2rad(rng.uniform(*LEAN))),
         turn=float(rng.uniform(0, 2 * np.pi)),
-        color=colorsys.hsv_to_rgb(hue, 0.9 * saturation, 0.15 + 0.75 * value),
+        color=color,
     )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import colorsys
 import json
 from pathlib import Path
 from typing import Protocol
@@ -29,6 +30,12 @@ class Furniture(Protocol):
 
     def panels(self) -> list[Panel]:
         """Its boxes, metres, world; what objects stand on comes first, where it has that."""
+
+
+def any_color(rng: np.random.Generator) -> tuple[float, float, float]:
+    """(3,), 0 to 1: neither black nor shining."""
+    hue, saturation, value = rng.random(3)
+    return colorsys.hsv_to_rgb(hue, 0.9 * saturation, 0.15 + 0.75 * value)
 
 
 def write_furniture(furniture: Furniture, folder: Path) -> None:

@@ -3,12 +3,12 @@ a back."""
 
 from __future__ import annotations
 
-import colorsys
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from tabletop.furniture import any_color
 from tabletop.settle import TABLE, Panel
 
 # Ranges in metres, inside; of the lower board above the floor, too.
@@ -82,7 +82,7 @@ class Shelf:
 
 def draw_shelf(rng: np.random.Generator) -> Shelf:
     """A compartment of any width, depth, colour and direction."""
-    hue, saturation, value = rng.random(3)
+    color = any_color(rng)
     return Shelf(
         width=float(rng.uniform(*WIDTH)),
         depth=float(rng.uniform(*DEPTH)),
@@ -91,5 +91,5 @@ def draw_shelf(rng: np.random.Generator) -> Shelf:
         clear=float(rng.uniform(*CLEAR)),
         above_floor=float(rng.uniform(*ABOVE_FLOOR)),
         turn=float(rng.uniform(0, 2 * np.pi)),
-        color=colorsys.hsv_to_rgb(hue, 0.9 * saturation, 0.15 + 0.75 * value),
+        color=color,
     )

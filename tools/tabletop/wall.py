@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import colorsys
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tabletop.camera import Camera
+from tabletop.furniture import any_color
 from tabletop.settle import TABLE, Panel
 
 # Half its size, metres: it fills the upper part of every image that has one.
@@ -48,9 +48,9 @@ def draw_wall(points: NDArray[np.float64], camera: Camera, rng: np.random.Genera
     plan = points[:, :2]
     last = float((plan @ normal).max()) + rng.uniform(*GAP)
     across = plan.mean(axis=0) - (plan.mean(axis=0) @ normal) * normal
-    hue, saturation, value = rng.random(3)
+    color = any_color(rng)
     return Wall(
         position=across + (last + HALF[0]) * normal,
         turn=turn,
-        color=colorsys.hsv_to_rgb(hue, 0.9 * saturation, 0.15 + 0.75 * value),
+        color=color,
     )
