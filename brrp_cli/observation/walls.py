@@ -21,7 +21,7 @@ class Wall:
     """An upright plane at which a table ends.
 
     patch : what is seen of it; outside : whether the table lies behind it, as it does behind the
-    outer face of a shelf's side; spans : whether it goes along all of the table
+    outer face of a shelf's side; spans : whether it is long and goes along the table
     """
 
     patch: Patch
@@ -76,7 +76,9 @@ def walls_of(
         wall = points[np.abs(patch.plane.signed_distance(points)) < config.near]
         rises = wall[table.plane.signed_distance(wall) > config.near]
         along = normalise(np.cross(table.plane.normal, patch.plane.normal))
-        spans = _covers(rises @ along, flat @ along, config.cell) >= config.spans
+        # A face of a thing may go along all of a table that shows little of itself.
+        spans = patch.across >= support.across
+        spans &= _covers(rises @ along, flat @ along, config.cell) >= config.spans
         found.append(Wall(patch, in_front < 0.5, spans))
     return tuple(found)
 

@@ -9,9 +9,9 @@ from room_scene import HEIGHT, TABLE, THINGS, YAW, photograph, seen, shelf, turn
 
 from brrp_cli.config.segmentation import SegmentConfig
 from brrp_cli.errors import FrameError
-from brrp_cli.observation.patches import Patch
+from brrp_cli.observation.patches import Patch, patch_of
 from brrp_cli.observation.support_plane import Plane
-from brrp_cli.observation.walls import Wall
+from brrp_cli.observation.walls import Wall, walls_of
 from brrp_cli.segmentation.segment import segment
 from brrp_cli.segmentation.table_plane import find_table
 
@@ -114,3 +114,21 @@ def test_the_side_of_a_large_box_is_no_wall_and_its_lid_no_board():
     table = table_of(frame)
     assert table.plane.normal @ up(frame) > 0.99
     assert table.walls == () and table.board is None
+
+
+@pytest.mark.parametrize(("wide", "spans"), [(0.3, False), (0.6, True)])
+def test_the_face_of_a_thing_is_shorter_than_a_wall(wide, spans):
+    """Also where it goes along all of the table that is seen."""
+    side = np.arange(-wide / 2, wide / 2, 0.005)
+    depth, height = np.arange(0, 0.15, 0.005), np.arange(0.005, 0.2, 0.005)
+    flat = np.stack([*np.meshgrid(side, depth + 0.005), np.zeros((len(depth), len(side)))], axis=-1)
+    rising = np.stack([*np.meshgrid(side, height), np.zeros((len(height), len(side)))], axis=-1)[
+        ..., [0, 2, 1]
+    ]
+    points = np.concatenate([flat.reshape(-1, 3), rising.reshape(-1, 3)]) + [0, -0.5, -0.5]
+    table, back = (
+        patch_of(Plane(np.array(normal), 0.5), points, 0.002, 0.02)
+        for normal in ([0.0, 0.0, 1.0], [0.0, 1.0, 0.0])
+    )
+    (found,) = walls_of(table, [table, back], points, CONFIG.table.wall, CONFIG.table.support)
+    assert found.patch is back and found.spans == spans
