@@ -95,6 +95,7 @@ def _size(_context: click.Context, _option: click.Parameter, value: str) -> tupl
 @click.option("--bin", "binned", is_flag=True, help="Drop objects into a bin.")
 @click.option("--wall", "walled", is_flag=True, help="Put a wall behind them.")
 @click.option("--shelf", "shelved", is_flag=True, help="Stand objects in a shelf.")
+@click.option("--dark-table", is_flag=True, help="A black and shiny one.")
 @click.option("--size", default="640x480", show_default=True, callback=_size)
 @click.option(
     "--distance",
@@ -140,6 +141,7 @@ def main(
     binned: bool,
     walled: bool,
     shelved: bool,
+    dark_table: bool,
     size: tuple[int, int],
     distance: tuple[float, float],
     elevation: tuple[float, float],
@@ -191,6 +193,7 @@ def main(
             binned,
             walled,
             shelved,
+            dark_table,
             Standpoint(distance, elevation, roll),
         )
         _report(list(_make_all(plan, scenes, workers)), output)

@@ -60,7 +60,8 @@ class SupportConfig:
     points : of the background and of the objects that are looked at, at most
     candidates : planes that are looked for; least : part of the points that a plane holds;
     of_largest : of the largest plane's points, as a part, that another one has, at least
-    patch : metres of the grid on which a plane's points hang together
+    patch : metres of the grid on which a plane's points hang together; piece : of such points, as a
+        part of the largest piece's, that belong to it, too, where things hide what lies between
     through : points seen behind a patch, as a part of its own, at most; off : metres from it and
     from its outline at which they are, and at which something is no part of it
     across : metres from end to end of one that is no face of a thing, at least; turn : degrees by
@@ -77,6 +78,7 @@ class SupportConfig:
     least: float = share(0.02)
     of_largest: float = share(0.1)
     patch: float = 0.02
+    piece: float = share(0.05)
     through: float = share(0.1)
     off: float = 0.02
     across: float = 0.35

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from brrp_cli.config.observation import ObservationConfig, SupportConfig
 from brrp_cli.geometry import IMAGE_UP, lengths
 from brrp_cli.hulls import in_hull
-from brrp_cli.observation.patches import Patch, Ransac, largest_planes, patch_of
+from brrp_cli.observation.patches import Patch, Ransac, largest_planes, patch_with_hidden
 from brrp_cli.observation.support_plane import Plane, fit_plane
 from brrp_cli.seeds import child_rng, child_seed
 
@@ -49,7 +49,7 @@ def supporting_plane(
     patches = [
         patch
         for plane, _ in planes
-        if (patch := patch_of(plane, near, config.plane_tolerance, config.support.patch))
+        if (patch := patch_with_hidden(plane, near, config.plane_tolerance, config.support))
     ]
     usual = next((patch for patch in patches if patch.plane is largest), None)
     return largest if usual is None else bearing(patches, usual, near, things, config.support).plane

@@ -67,18 +67,51 @@ class Ransac:
 def patch_of(plane: Plane, points: Points, tolerance: float, cell: float) -> Patch | None:
     """The patch of points (n, 3), metres, camera frame, that are nearer to a plane than
     `tolerance`, on a grid of `cell` metres; None where it has no extent."""
+    axes, count, pieces = _pieces(plane, points, tolerance, cell)
+    return _patch(plane, axes, pieces[0], count) if pieces else None
+
+
+def patch_with_hidden(
+    plane: Plane, points: Points, tolerance: float, config: SupportConfig
+) -> Patch | None:
+    """As `patch_of`, with what lies on the other side of things: large pieces of the plane between
+    which nothing is seen behind it. Things that go across the image part a table so."""
+    axes, count, pieces = _pieces(plane, points, tolerance, config.patch)
+    found = _patch(plane, axes, pieces[0], count) if pieces else None
+    for piece in pieces[1:]:
+        if found is None or len(piece) < config.piece * len(pieces[0]):
+            break
+        on = np.concatenate([pieces[0], piece])
+        joined = _patch(plane, axes, on, count)
+        if joined is None:
+            continue
+        more = joined.seen_through(points, config.off) - found.seen_through(points, config.off)
+        if more <= config.through * len(piece):
+            pieces[0], found = on, joined
+    return found
+
+
+def _pieces(
+    plane: Plane, points: Points, tolerance: float, cell: float
+) -> tuple[NDArray[np.float64], int, list[NDArray[np.float64]]]:
+    """Axes of a plane's plan, how many of points (n, 3) are near it, and the plan points (m, 2) of
+    each piece of it that hangs together, the largest first."""
     axes = np.linalg.svd(plane.normal[None])[2][1:]
     near = points[np.abs(plane.signed_distance(points)) < tolerance]
-    if not len(near):
-        return None
-    on = _largest_patch(near @ axes.T, cell)
+    return axes, len(near), _hanging_together(near @ axes.T, cell) if len(near) else []
+
+
+def _patch(
+    plane: Plane, axes: NDArray[np.float64], on: NDArray[np.float64], count: int
+) -> Patch | None:
+    """The patch of plan points (n, 2); None where they have no extent."""
     hull = convex_hull(on)
     if hull is None:
         return None
     # The ends of it in each of its directions, which are many enough.
     ends = on @ hull[:, :2].T
     across = float((ends.max(axis=0) - ends.min(axis=0)).max())
-    return Patch(plane, axes, hull, len(near), across)
+    return Patch(plane, axes, hull, count, across)
 
 
 def largest_planes(
@@ -127,8 +160,9 @@ def _largest(points: NDArray[np.float64], seed: int, ransac: Ransac) -> Plane | 
     return Plane(model[:3], float(model[3]))
 
 
-def _largest_patch(plan: NDArray[np.float64], cell: float) -> NDArray[np.float64]:
-    """Those of the plan points (n, 2) that hang together: a floor beyond the edge is no table."""
+def _hanging_together(plan: NDArray[np.float64], cell: float) -> list[NDArray[np.float64]]:
+    """Plan points (n, 2) by the patches that they make up, the largest first: a floor beyond the
+    edge is no table."""
     ndimage = import_library("scipy.ndimage")
     cells = np.floor(plan / cell).astype(np.int64)
     cells -= cells.min(axis=0)
@@ -137,4 +171,6 @@ def _largest_patch(plan: NDArray[np.float64], cell: float) -> NDArray[np.float64
     # Objects hide parts of the table behind them: patches up to 8 cm apart are one.
     joined, _ = ndimage.label(ndimage.binary_dilation(grid, iterations=2))
     patch = joined[tuple(cells.T)]
-    return plan[patch == np.bincount(patch).argmax()]
+    counts = np.bincount(patch)
+    largest_first = np.argsort(-counts, kind="stable")
+    return [plan[patch == i] for i in largest_first if counts[i]]

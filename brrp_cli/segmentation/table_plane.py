@@ -11,7 +11,7 @@ from brrp_cli.config.table import BinsConfig, TableConfig
 from brrp_cli.errors import FrameError
 from brrp_cli.hulls import beyond_hull, in_hull
 from brrp_cli.observation.borne import bearing
-from brrp_cli.observation.patches import Ransac, largest_planes, patch_of
+from brrp_cli.observation.patches import Ransac, largest_planes, patch_with_hidden
 from brrp_cli.observation.support_plane import Plane
 from brrp_cli.observation.walls import Board, Wall, board_over, walls_of
 from brrp_cli.seeds import child_rng
@@ -117,7 +117,7 @@ def find_table(
     patches = {
         number: patch
         for number, (plane, _) in enumerate(planes)
-        if (patch := patch_of(plane, points, config.tolerance, config.support.patch)) is not None
+        if (patch := patch_with_hidden(plane, points, config.tolerance, config.support)) is not None
     }
     usual = patches.get(_above_the_floor(planes, config))
     if usual is None:

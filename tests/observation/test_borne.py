@@ -12,8 +12,14 @@ from brrp_cli.config import ObservationConfig, preset
 from brrp_cli.config.observation import SupportConfig
 from brrp_cli.config.segmentation import SegmentConfig
 from brrp_cli.geometry import transform_points
+from brrp_cli.hulls import in_hull
 from brrp_cli.observation.borne import bearing, standing_on
-from brrp_cli.observation.patches import Ransac, largest_planes, patch_of
+from brrp_cli.observation.patches import (
+    Ransac,
+    largest_planes,
+    patch_of,
+    patch_with_hidden,
+)
 from brrp_cli.observation.ray_samples import scene_plane
 from brrp_cli.observation.support_plane import Plane
 from brrp_cli.segmentation.table_plane import find_table
@@ -75,6 +81,25 @@ def test_what_is_seen_behind_a_surface_shows_that_it_is_none():
     behind = facing(0.5, near).seen_through(floor, 0.02)
     # Of the floor, twice as far away, what lies behind 0.2 m less 2 cm on each side.
     assert behind == pytest.approx((2 * 0.16 / 0.005) ** 2, rel=0.1)
+
+
+def test_things_that_go_across_the_image_do_not_part_a_table():
+    floor = square(1.0, 0.8)
+    # A strip of it lies behind something, 12 cm wide.
+    hidden = np.abs(floor[:, 0] - 0.1) < 0.06
+    table = np.concatenate([floor[~hidden], 0.8 * floor[hidden]])
+    plane = Plane(np.array([0.0, 0.0, -1.0]), 1.0)
+    beyond = floor[floor[:, 0] > 0.2]
+
+    def holds(patch):
+        return in_hull(patch.hull, patch.plan(beyond), 1e-6)
+
+    assert not holds(patch_of(plane, table, 0.01, 0.02)).any()
+    whole = patch_with_hidden(plane, table, 0.01, CONFIG)
+    assert holds(whole).all() and whole.count == (~hidden).sum()
+    # Where a floor is seen between them, they are two tables.
+    two = np.concatenate([floor[~hidden], 1.5 * floor[hidden]])
+    assert not holds(patch_with_hidden(plane, two, 0.01, CONFIG)).any()
 
 
 def test_what_reaches_down_to_a_plane_stands_on_it():

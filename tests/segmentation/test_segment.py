@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import room_scene
 import trimesh
 from scipy.ndimage import binary_dilation
 from table_scene import T_CAM_WORLD, in_camera, photograph
@@ -67,6 +68,22 @@ def test_what_stands_beside_the_table_is_background(scene):
     wall = scene.depth > 1.3
     assert wall.sum() > 100
     assert not found[wall & (scene.segmap == 0)].any()
+
+
+def test_the_table_on_both_sides_of_a_thing_that_goes_across_the_image_is_one():
+    across = solids.box(0.12, 0.9, 0.12)
+    before = solids.moved(solids.box(0.05, 0.05, 0.06), x=0.2, y=0.03)
+    frame = room_scene.photograph(
+        [room_scene.turned(across), room_scene.turned(before)],
+        [room_scene.TABLE],
+        elevation=0.6,
+        distance=0.7,
+    )
+    masks = segment(frame, keep_all=True)
+    assert masks.max() == 2
+    for object_id in frame.object_ids:
+        mine = masks == np.bincount(masks[frame.segmap == object_id]).argmax()
+        assert overlap(mine, frame.segmap == object_id) > 0.9
 
 
 def test_an_empty_table_and_no_table_are_told(scene):

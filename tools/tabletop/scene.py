@@ -48,7 +48,7 @@ class Plan:
     `size`: (width, height); `sensor`: one of `SENSOR_NAMES`, instead of noise; `stacked`: every
     second object is dropped onto the one before it; `binned`: objects lie in a bin; `walled`: a
     wall stands behind them, as the first camera sees them; `shelved`: they stand in a shelf;
-    `standpoint`: where cameras stand."""
+    `dark_table`: it is black and shiny; `standpoint`: where cameras stand."""
 
     meshes: tuple[Path, ...]
     data_root: Path
@@ -64,6 +64,7 @@ class Plan:
     binned: bool = False
     walled: bool = False
     shelved: bool = False
+    dark_table: bool = False
     standpoint: Standpoint = field(default_factory=Standpoint)
 
 
@@ -90,6 +91,8 @@ def make_scene(plan: Plan, number: int, check: bool) -> list[Distance]:
     )
     rng = child_rng(plan.seed, "scene", number, "views")
     look = draw_look(len(models), rng)
+    if plan.dark_table:
+        look = replace(look, table_color=0.15 * look.table_color)
     centers = [pose.apply(model.center[None])[0] for pose, model in zip(poses, models, strict=True)]
     center = np.mean(centers, axis=0)
     azimuth = (0.0, 2 * np.pi) if shelf is None else shelf.azimuth
@@ -143,6 +146,7 @@ def make_scene(plan: Plan, number: int, check: bool) -> list[Distance]:
                     depth.shape,
                     material_rng,
                     furniture,
+                    plan.dark_table,
                 )
                 depth = measured_buffer(
                     plan.sensor, stage, child_rng(plan.seed, "scene", number, "sensor", i)

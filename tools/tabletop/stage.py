@@ -136,8 +136,11 @@ def stage_of(
     shape: tuple[int, int],
     rng: np.random.Generator,
     furniture: Furniture | None = None,
+    dark_table: bool = False,
 ) -> Stage:
-    """The stage of a tabletop scene; `rng` draws what the materials do to infrared light."""
+    """The stage of a tabletop scene; `rng` draws what the materials do to infrared light.
+
+    dark_table : whether the table, or the floor, hardly sends any of it back"""
     R = _FLIP @ camera.view[:3, :3]
     t = _FLIP @ camera.view[:3, 3]
     surfaces = [
@@ -148,7 +151,8 @@ def stage_of(
         )
     ]
     ground = TABLE if furniture is None else furniture.ground
-    surfaces.append(_panel(ground, *_furniture(rng), R, t))
+    usual = _furniture(rng)
+    surfaces.append(_panel(ground, *(_dark(rng) if dark_table else usual), R, t))
     if furniture is not None:
         material = _furniture(rng)
         surfaces += [_panel(panel, *material, R, t) for panel in furniture.panels()]
@@ -183,6 +187,11 @@ def _material(
 
 def _furniture(rng: np.random.Generator) -> tuple[NDArray[np.float64], float]:
     albedo, gloss = rng.uniform(0.3, 0.8), rng.uniform(0.0, 0.3)
+    return np.asarray(albedo), float(gloss)
+
+
+def _dark(rng: np.random.Generator) -> tuple[NDArray[np.float64], float]:
+    albedo, gloss = rng.uniform(0.03, 0.1), rng.uniform(0.3, 0.8)
     return np.asarray(albedo), float(gloss)
 
 
