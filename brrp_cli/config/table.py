@@ -9,6 +9,32 @@ from brrp_cli.config.ranges import between, share
 
 
 @dataclass(frozen=True)
+class BareConfig:
+    """How far a table goes on where it has no depth (segmentation/standing_beside.py).
+
+    rises, high : metres above the plane between which something is a thing, or part of it; jump :
+        metres of depth between two of them; pixels : of one, at least; bled : percentiles of its
+        plan at both ends that may have bled
+    foot : metres to which it reaches down, but for its `lowest` percent; partly : or as a part of
+        it, what stands within the hull; inside : part of one that asks for no more table
+    off : metres behind the plane, and within an outline, at which something is seen through it;
+    through : as a part of the thing's pixels, at most
+    """
+
+    rises: float = 0.012
+    high: float = 0.5
+    jump: float = 0.03
+    pixels: int = 150
+    bled: float = between(2.0, 0.0, 25.0)
+    foot: float = 0.03
+    lowest: float = between(5.0, 0.0, 50.0)
+    partly: float = share(0.25)
+    inside: float = share(0.98)
+    off: float = 0.02
+    through: float = share(0.1)
+
+
+@dataclass(frozen=True)
 class TableConfig:
     """The table's plane and its extent.
 
@@ -21,7 +47,8 @@ class TableConfig:
     beyond : metres that the table goes on beyond the image's border, where it reaches it; blind :
         part of the image along its border that may be without depth; edge : pixels, the last ones
         before that, which are not trusted; step : pixels over which the way out of it is read
-    support : which plane is the table; wall : what shuts it off
+    support : which plane is the table; wall : what shuts it off; bare : where it has no depth;
+        lacking : part of its pixels without depth from which on that tells nothing of its things
     """
 
     points: int = 40_000
@@ -40,6 +67,8 @@ class TableConfig:
     step: int = between(12, 1, 64)
     support: SupportConfig = field(default_factory=SupportConfig)
     wall: WallConfig = field(default_factory=WallConfig)
+    bare: BareConfig = field(default_factory=BareConfig)
+    lacking: float = share(0.3)
 
 
 @dataclass(frozen=True)

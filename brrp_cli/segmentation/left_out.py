@@ -26,12 +26,14 @@ def left_out(
     depth: NDArray[np.floating],
     height: NDArray[np.floating],
     over: NDArray[np.bool_],
+    bare: NDArray[np.bool_],
     config: LeftOutConfig,
 ) -> dict[int, str]:
     """Why a mask is no whole object on the table, `CUT`, `IN_THE_AIR` or `EDGE`, by id.
 
     segmap : (H, W), 0 = background; depth, height : (H, W) metres along z and above the support
-    plane, NaN = no return; over : (H, W) pixels that lie over the table, no farther than it reaches
+    plane, NaN = no return; over : (H, W) pixels that lie over the table, no farther than it
+    reaches; bare : (H, W) pixels of a table that has no depth there, which tells nothing of masks
     """
     ndimage = import_library("scipy.ndimage")
     reasons = {}
@@ -49,13 +51,14 @@ def left_out(
         mask = segmap[window] == object_id
         if not (mask & np.isfinite(height[window])).any():
             continue
-        if _at_the_edge(mask, depth[window], height[window], config):
+        if _at_the_edge(mask, depth[window], height[window], bare[window], config):
             reasons[object_id] = EDGE
             continue
         # Balls lie on the table, and beside it are other things.
         is_over = over[window][mask].mean() > config.over
         round_stands = config.over_stands if is_over else config.round_stands
-        if not _stands(mask, segmap[window], depth[window], height[window], round_stands, config):
+        around = (segmap[window], depth[window], height[window], bare[window])
+        if not _stands(mask, *around, round_stands, config):
             reasons[object_id] = IN_THE_AIR
     return reasons
 
@@ -84,13 +87,14 @@ def _at_the_edge(
     mask: NDArray[np.bool_],
     depth: NDArray[np.floating],
     height: NDArray[np.floating],
+    bare: NDArray[np.bool_],
     config: LeftOutConfig,
 ) -> bool:
     """Whether what is low has, around much of it, no table but what is far behind it."""
     ndimage = import_library("scipy.ndimage")
     if np.nanpercentile(height[mask], 100 - config.lowest) >= config.edge_height:
         return False
-    around = ndimage.binary_dilation(mask, iterations=config.reach) & ~mask
+    around = ndimage.binary_dilation(mask, iterations=config.reach) & ~mask & ~bare
     farther = ~(depth[around] <= np.nanmedian(depth[mask]) + config.edge)
     return bool(farther.sum() > config.edge_share * max(int(around.sum()), 1))
 
@@ -100,6 +104,7 @@ def _stands(
     segmap: NDArray[np.int64],
     depth: NDArray[np.floating],
     height: NDArray[np.floating],
+    bare: NDArray[np.bool_],
     round_stands: float,
     config: LeftOutConfig,
 ) -> bool:
@@ -120,8 +125,8 @@ def _stands(
     foot = outline & (height <= np.percentile(height[outline], config.foot))
     own = float(np.median(depth[foot]))
     beside = ndimage.binary_dilation(foot, iterations=config.reach) & ~mask
-    beside &= np.isfinite(depth) | (segmap != 0)
+    beside &= np.isfinite(depth) | (segmap != 0) | bare
     nearer = depth[beside] < own - config.touch
     # Also where the other mask has no depth, as at its edge.
     bears = (segmap[beside] != 0) & ~(depth[beside] > own + config.touch)
-    return bool((nearer | bears).sum() > config.held * max(int(beside.sum()), 1))
+    return bool((nearer | bears | bare[beside]).sum() > config.held * max(int(beside.sum()), 1))

@@ -13,6 +13,7 @@ from brrp_cli.hulls import beyond_hull
 from brrp_cli.observation.walls import Wall
 from brrp_cli.segmentation.beyond_image import beyond_image
 from brrp_cli.segmentation.bins import find_bins
+from brrp_cli.segmentation.standing_beside import Seen, with_things_beside
 from brrp_cli.segmentation.table_plane import Table, find_table
 
 
@@ -42,16 +43,22 @@ def see_table(
     table = find_table(points[valid], seed, source, config.table)
     plan, height = table.plan(points), table.plane.signed_distance(points)
     beside = table.beside(plan)
-    walls = config.table.wall
+    walls, bare = config.table.wall, config.table.bare
     off = np.zeros(valid.shape, dtype=bool)
     for wall in table.walls:
         if wall.spans:
             off |= wall.holds(points, walls.near)
     if table.board is not None:
         off |= height > table.board.height - walls.near
+    flat = (np.abs(height) < config.table.tolerance) & (beside <= 0)
+    hull = with_things_beside(
+        table.hull, flat, off, Seen(points, plan, height, _crossing(table, points, config)), bare
+    )
+    if hull is not table.hull:
+        table = replace(table, hull=hull)
+        beside = np.minimum(beside, table.beside(plan))
     near = (beside <= config.bins.beside) & ~off
     table = replace(table, bins=find_bins(plan[near], height[near], config.bins))
-    flat = (np.abs(height) < config.table.tolerance) & (beside <= 0)
     beyond = beyond_image(plan, flat, config.table)
     if beyond is not None:
         outside = beside > 0
@@ -61,6 +68,14 @@ def see_table(
             off |= wall.holds(points, walls.near)
     beside[off] = np.inf
     return SeenTable(table, plan, table.above_floors(plan, height), beside)
+
+
+def _crossing(
+    table: Table, points: NDArray[np.floating], config: SegmentConfig
+) -> NDArray[np.float64]:
+    """(n, 2) where sight crosses the table's plane, of what is seen behind it."""
+    behind = points[table.plane.signed_distance(points) < -config.table.bare.off]
+    return table.plan(behind * (-table.plane.offset / (behind @ table.plane.normal))[:, None])
 
 
 def _fills_border(

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from brrp_cli.config.segmentation import SegmentConfig
 from brrp_cli.errors import FrameError
 from brrp_cli.frames.frame import BACKGROUND, Frame
+from brrp_cli.segmentation.bare_table import bare_pixels
 from brrp_cli.segmentation.beneath import hides_its_foot
 from brrp_cli.segmentation.components import absorb_small
 from brrp_cli.segmentation.fill_concavities import fill_inside
@@ -122,10 +123,13 @@ def _without(
     height = table.height(points)
     over, masked = np.zeros(frame.shape, dtype=bool), (segmap > 0) & frame.valid
     over[masked] = table.holds(table.plan(points[masked]), 0.0)
+    bare = bare_pixels(frame, segmap, table, config.table)
     # What hides its own foot, as from above, is not seen to hang.
     reasons = {
         i: reason
-        for i, reason in left_out(segmap, points[..., 2], height, over, config.left_out).items()
+        for i, reason in left_out(
+            segmap, points[..., 2], height, over, bare, config.left_out
+        ).items()
         if reason != IN_THE_AIR
         or not hides_its_foot(segmap == i, frame, table.plane, over, config.left_out)
     }

@@ -273,7 +273,7 @@ def test_a_ball_whose_lower_half_is_hidden_stands_and_a_flat_thing_in_the_air_do
     ball = np.linspace(0.09, 0.048, 20)[:, None]
     height = np.where(segmap == 1, np.pad(ball, ((20, 20), (0, 0))), 0.0)
     height = np.where(segmap == 2, 0.062, height)
-    assert left_out(segmap, depth, height, NOWHERE, LeftOutConfig()) == {2: IN_THE_AIR}
+    assert left_out(segmap, depth, height, NOWHERE, NOWHERE, LeftOutConfig()) == {2: IN_THE_AIR}
 
 
 def test_what_lies_on_a_thing_without_depth_at_its_edge_stands():
@@ -284,8 +284,8 @@ def test_what_lies_on_a_thing_without_depth_at_its_edge_stands():
     height = np.where(segmap == 1, 0.1, np.where(segmap == 2, 0.03, 0.0))
     depth[30:50, 20:40] = np.nan
     height[30:50, 20:40] = np.nan
-    assert left_out(segmap, depth, height, NOWHERE, LeftOutConfig()) == {}
-    assert left_out(segmap % 2, depth, height, NOWHERE, LeftOutConfig()) == {1: IN_THE_AIR}
+    assert left_out(segmap, depth, height, NOWHERE, NOWHERE, LeftOutConfig()) == {}
+    assert left_out(segmap % 2, depth, height, NOWHERE, NOWHERE, LeftOutConfig()) == {1: IN_THE_AIR}
 
 
 def test_a_large_ball_over_the_table_stands_and_what_is_beside_the_table_does_not():
@@ -295,8 +295,8 @@ def test_a_large_ball_over_the_table_stands_and_what_is_beside_the_table_does_no
     # The upper half of a ball of 14 cm.
     ball = np.linspace(0.14, 0.075, 20)[:, None]
     height = np.where(segmap > 0, np.pad(ball, ((20, 20), (0, 0))), 0.0)
-    assert left_out(segmap, depth, height, ~NOWHERE, LeftOutConfig()) == {}
-    assert left_out(segmap, depth, height, NOWHERE, LeftOutConfig()) == {1: IN_THE_AIR}
+    assert left_out(segmap, depth, height, ~NOWHERE, NOWHERE, LeftOutConfig()) == {}
+    assert left_out(segmap, depth, height, NOWHERE, NOWHERE, LeftOutConfig()) == {1: IN_THE_AIR}
 
 
 def test_a_mask_that_bled_over_the_table_ends_where_colour_does():
@@ -321,6 +321,6 @@ def test_a_smear_at_the_tables_edge_is_told_from_a_flat_thing_on_it():
     segmap[20:24, 10:50] = 1
     segmap[40:44, 10:50] = 2
     height = np.where(segmap > 0, 0.012, 0.0)
-    assert left_out(segmap, depth, height, NOWHERE, LeftOutConfig()) == {1: EDGE}
+    assert left_out(segmap, depth, height, NOWHERE, NOWHERE, LeftOutConfig()) == {1: EDGE}
     taller = np.where(segmap > 0, (u - 10) / 40 * 0.08, 0.0)
-    assert left_out(segmap, depth, taller, NOWHERE, LeftOutConfig()) == {}
+    assert left_out(segmap, depth, taller, NOWHERE, NOWHERE, LeftOutConfig()) == {}
