@@ -17,8 +17,8 @@ class BareConfig:
         plan at both ends that may have bled
     foot : metres to which it reaches down, but for its `lowest` percent; partly : or as a part of
         it, what stands within the hull; inside : part of one that asks for no more table
-    off : metres behind the plane, and within an outline, at which something is seen through it;
-    through : as a part of the thing's pixels, at most
+    bare : part of what lies between it and the hull, as the image shows it, that has no depth, at
+        least; through : as a part of that, what is seen more than `off` metres behind the plane
     """
 
     rises: float = 0.012
@@ -30,6 +30,7 @@ class BareConfig:
     lowest: float = between(5.0, 0.0, 50.0)
     partly: float = share(0.25)
     inside: float = share(0.98)
+    bare: float = share(0.3)
     off: float = 0.02
     through: float = share(0.1)
 

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from brrp_cli.config.table import TableConfig
 from brrp_cli.frames.frame import BACKGROUND, Frame
 from brrp_cli.geometry import backproject
+from brrp_cli.observation.support_plane import Plane
 from brrp_cli.segmentation.table_plane import Table
 
 
@@ -19,12 +20,20 @@ def bare_pixels(
 
     segmap : (H, W), 0 = none
     """
-    sight = backproject(np.ones(frame.shape), frame.K).reshape(-1, 3).astype(np.float64)
-    down = sight @ table.plane.normal
-    meets = (down < 0) & (segmap == BACKGROUND).ravel()
-    at = sight[meets] * (-table.plane.offset / down[meets])[:, None]
-    meets[meets] = table.holds(table.plan(at), 0.0)
-    bare = meets.reshape(frame.shape) & ~frame.valid
-    if bare.sum() < config.lacking * meets.sum():
+    plan = table.plan(meets_plane(frame.shape, frame.K, table.plane))
+    over = (segmap == BACKGROUND) & (table.beside(plan) <= 0)
+    bare = over & ~frame.valid
+    if bare.sum() < config.lacking * over.sum():
         return np.zeros(frame.shape, dtype=bool)
     return bare
+
+
+def meets_plane(
+    shape: tuple[int, int], K: NDArray[np.floating], plane: Plane
+) -> NDArray[np.float64]:
+    """Points (H, W, 3), metres, camera frame, where the sight of each pixel meets a plane; NaN
+    where it does not."""
+    sight = backproject(np.ones(shape), K).astype(np.float64)
+    down = sight @ plane.normal
+    far = np.where(down < 0, -plane.offset / np.where(down < 0, down, -1.0), np.nan)
+    return sight * far[..., None]

@@ -64,7 +64,7 @@ def furniture(frame: Frame, plane: Plane | None, seed: int, config: SegmentConfi
     """
     points = backproject(smoothed(frame, config), frame.K)
     try:
-        table = see_table(points, seed, frame.source, config).table
+        table = see_table(points, frame.K, seed, frame.source, config).table
     except FrameError as error:
         log.info("No table was found, and so nothing around it: %s", error.what)
         return Furniture()

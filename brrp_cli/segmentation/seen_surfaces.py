@@ -62,7 +62,7 @@ def see_surfaces(frame: Frame, seed: int, config: SegmentConfig) -> SeenSurfaces
             f" {int(valid.sum())} of them agree with their neighbours",
             fix="check the depth image and its unit; masks made elsewhere go in by --masks",
         )
-    found = see_table(points, seed, frame.source, config)
+    found = see_table(points, frame.K, seed, frame.source, config)
     normals = surface_normals(points, config.concave_edges)
     return SeenSurfaces(
         depth,

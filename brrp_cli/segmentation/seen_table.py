@@ -11,6 +11,7 @@ from brrp_cli.config.observation import WallConfig
 from brrp_cli.config.segmentation import SegmentConfig
 from brrp_cli.hulls import beyond_hull
 from brrp_cli.observation.walls import Wall
+from brrp_cli.segmentation.bare_table import meets_plane
 from brrp_cli.segmentation.beyond_image import beyond_image
 from brrp_cli.segmentation.bins import find_bins
 from brrp_cli.segmentation.standing_beside import Seen, with_things_beside
@@ -33,10 +34,15 @@ class SeenTable:
 
 
 def see_table(
-    points: NDArray[np.floating], seed: int, source: object, config: SegmentConfig
+    points: NDArray[np.floating],
+    K: NDArray[np.floating],
+    seed: int,
+    source: object,
+    config: SegmentConfig,
 ) -> SeenTable:
     """The table of points (H, W, 3), metres, camera frame, NaN = none.
 
+    K : (3, 3) of the camera
     source : for messages. Errors: FrameError if there is no table.
     """
     valid = np.isfinite(points[..., 2])
@@ -51,9 +57,8 @@ def see_table(
     if table.board is not None:
         off |= height > table.board.height - walls.near
     flat = (np.abs(height) < config.table.tolerance) & (beside <= 0)
-    hull = with_things_beside(
-        table.hull, flat, off, Seen(points, plan, height, _crossing(table, points, config)), bare
-    )
+    crossing = table.plan(meets_plane(valid.shape, K, table.plane))
+    hull = with_things_beside(table.hull, flat, off, Seen(points, plan, height, crossing), bare)
     if hull is not table.hull:
         table = replace(table, hull=hull)
         beside = np.minimum(beside, table.beside(plan))
@@ -68,14 +73,6 @@ def see_table(
             off |= wall.holds(points, walls.near)
     beside[off] = np.inf
     return SeenTable(table, plan, table.above_floors(plan, height), beside)
-
-
-def _crossing(
-    table: Table, points: NDArray[np.floating], config: SegmentConfig
-) -> NDArray[np.float64]:
-    """(n, 2) where sight crosses the table's plane, of what is seen behind it."""
-    behind = points[table.plane.signed_distance(points) < -config.table.bare.off]
-    return table.plan(behind * (-table.plane.offset / (behind @ table.plane.normal))[:, None])
 
 
 def _fills_border(

@@ -1,7 +1,7 @@
 """A table of which much has no depth, as of black or shiny ones: things tell how far it goes.
 
-What reaches down to the table's height, with nothing seen behind the plane between it and the part
-that has depth, stands on the table.
+What reaches down to the table's height, where nothing is seen behind the plane between it and the
+part that has depth, and most is without depth, stands on the table.
 """
 
 from __future__ import annotations
@@ -17,14 +17,17 @@ from brrp_cli.hulls import convex_hull, in_hull
 
 Mask = NDArray[np.bool_]
 
+# Enough pixels to tell what is seen of a part of a plane.
+EVERY = np.s_[::2, ::2]
+
 
 @dataclass(frozen=True)
 class Seen:
     """What is seen of a plane and over it.
 
     points : (H, W, 3) metres, camera frame, NaN = no depth; plan : (H, W, 2) metres, on the plane;
-    height : (H, W) metres above it; crossing : (n, 2) where sight crosses it, of what is seen
-    behind it
+    height : (H, W) metres above it; crossing : (H, W, 2) metres, where sight crosses it, NaN where
+    it does not
     """
 
     points: NDArray[np.floating]
@@ -41,6 +44,9 @@ def with_things_beside(
     flat : (H, W) its pixels; off : (H, W) those that walls shut off
     """
     on = seen.plan[flat]
+    crossing = seen.crossing[EVERY].reshape(-1, 2)
+    lacks = ~np.isfinite(seen.height[EVERY]).ravel()
+    behind = (seen.height[EVERY] < -config.off).ravel()
     for thing in _things(hull, off, seen, config):
         if in_hull(hull, thing, 0.0).mean() > config.inside:
             continue
@@ -48,8 +54,9 @@ def with_things_beside(
         grown = convex_hull(both)
         if grown is None:
             continue
-        behind = [in_hull(each, seen.crossing, -config.off).sum() for each in (hull, grown)]
-        if behind[1] - behind[0] <= config.through * len(thing):
+        between = in_hull(grown, crossing, 0.0) & ~in_hull(hull, crossing, 0.0)
+        through, bare = (int(each[between].sum()) for each in (behind, lacks))
+        if through <= config.through * bare and bare >= config.bare * between.sum():
             on, hull = both, grown
     return hull
 

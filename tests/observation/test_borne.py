@@ -83,6 +83,22 @@ def test_what_is_seen_behind_a_surface_shows_that_it_is_none():
     assert behind == pytest.approx((2 * 0.16 / 0.005) ** 2, rel=0.1)
 
 
+def test_the_face_of_a_near_thing_is_no_table_however_many_pixels_show_it():
+    face = square(0.4, 0.2, step=0.002)
+    face[:, 2] += 0.75 * face[:, 1]
+    near = patch_of(Plane(np.array([0.0, 0.6, -0.8]), 0.32), face, 0.01, 0.02)
+    post = np.array([[x, 0.3, 1.0 - h] for x in np.arange(0.0, 0.3, 0.01) for h in (0.025, 0.1)])
+
+    # It hides what of the table lies behind it.
+    floor = square(1.0, 0.8, step=0.01)
+    crossing = floor * (-near.plane.offset / (floor @ near.plane.normal))[:, None]
+    hidden = in_hull(near.hull, near.plan(crossing), 0.0)
+    points = np.concatenate([face, floor[~hidden], post])
+    patches = [patch_of(near.plane, points, 0.01, 0.02), facing(1.0, points)]
+    assert patches[0].count > patches[1].count
+    assert bearing(patches, patches[0], points, None, CONFIG) is patches[1]
+
+
 def test_things_that_go_across_the_image_do_not_part_a_table():
     floor = square(1.0, 0.8)
     # A strip of it lies behind something, 12 cm wide.

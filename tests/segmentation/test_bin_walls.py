@@ -29,7 +29,7 @@ SQUARE = np.array([[0.0, 0.0], [2.0, 0.0], [2.0, 1.0], [0.0, 1.0]])
 def bin_walls(frame, config=CONFIG):
     """Of each bin, camera frame."""
     try:
-        plane = see_table(frame.points, 0, None, config).table.plane
+        plane = see_table(frame.points, frame.K, 0, None, config).table.plane
     except FrameError:
         plane = None
     return furniture(frame, plane, 0, config).bins
@@ -117,7 +117,7 @@ def test_without_a_table_there_are_none():
     K = np.array([[150.0, 0, 80], [0, 150.0, 60], [0, 0, 1]])
     frame = make_frame(depth=depth, K=K)
     with pytest.raises(FrameError):
-        see_table(frame.points, 0, None, CONFIG)
+        see_table(frame.points, frame.K, 0, None, CONFIG)
     assert bin_walls(frame) == []
 
 

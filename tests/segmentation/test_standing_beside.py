@@ -34,7 +34,7 @@ def bare(frame: Frame) -> Frame:
 
 def beside(frame: Frame, object_id: int) -> float:
     """Metres that the middle of an object lies beside the table, as it is seen without its mask."""
-    seen = see_table(frame.points, 0, None, CONFIG)
+    seen = see_table(frame.points, frame.K, 0, None, CONFIG)
     return float(np.nanmedian(seen.beside[frame.segmap == object_id]))
 
 
@@ -69,7 +69,7 @@ def test_what_stands_on_another_table_is_no_part_of_this_one():
 
 def test_a_table_lacks_depth_where_it_is_bare():
     whole = photograph(THINGS, [TABLE], elevation=ELEVATION, distance=DISTANCE)
-    table = see_table(whole.points, 0, None, CONFIG).table
+    table = see_table(whole.points, whole.K, 0, None, CONFIG).table
     assert not bare_pixels(whole, whole.segmap, table, CONFIG.table).any()
     frame = bare(whole)
     found = bare_pixels(frame, frame.segmap, table, CONFIG.table)
