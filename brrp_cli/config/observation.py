@@ -54,6 +54,25 @@ class WallConfig:
 
 
 @dataclass(frozen=True)
+class HeapConfig:
+    """When a plane goes through a heap of things, and is lowered (observation/lowered.py).
+
+    beneath : points that lie from `off` to `deep` metres beneath it, as a part of its own, from
+        which on it does
+    turn : degrees by which what bears the heap is turned against it, at most; rounds : times that a
+        lower one is looked for, and times that it is fitted to the lowest points over each `cell`
+        metres of it
+    """
+
+    beneath: float = between(0.4, 0.0, 100.0)
+    off: float = 0.02
+    deep: float = 0.12
+    turn: float = between(30.0, 0.0, 90.0)
+    rounds: int = between(3, 1, 10)
+    cell: float = 0.02
+
+
+@dataclass(frozen=True)
 class SupportConfig:
     """Which of a frame's large planes bears its things (observation/borne.py).
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from brrp_cli.config.observation import SupportConfig, WallConfig
+from brrp_cli.config.observation import HeapConfig, SupportConfig, WallConfig
 from brrp_cli.config.ranges import between, share
 
 
@@ -48,8 +48,9 @@ class TableConfig:
     beyond : metres that the table goes on beyond the image's border, where it reaches it; blind :
         part of the image along its border that may be without depth; edge : pixels, the last ones
         before that, which are not trusted; step : pixels over which the way out of it is read
-    support : which plane is the table; wall : what shuts it off; bare : where it has no depth;
-        lacking : part of its pixels without depth from which on that tells nothing of its things
+    support : which plane is the table; heap : when a plane is none; wall : what shuts it off;
+    bare : where it has no depth; lacking : part of its pixels without depth from which on that
+        tells nothing of its things
     """
 
     points: int = 40_000
@@ -68,6 +69,7 @@ class TableConfig:
     step: int = between(12, 1, 64)
     support: SupportConfig = field(default_factory=SupportConfig)
     wall: WallConfig = field(default_factory=WallConfig)
+    heap: HeapConfig = field(default_factory=HeapConfig)
     bare: BareConfig = field(default_factory=BareConfig)
     lacking: float = share(0.3)
 

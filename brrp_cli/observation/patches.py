@@ -91,12 +91,17 @@ def patch_with_hidden(
     return found
 
 
+def axes_of(plane: Plane) -> NDArray[np.float64]:
+    """(2, 3) unit, spanning a plane: plan coordinates are points @ axes.T."""
+    return np.asarray(np.linalg.svd(plane.normal[None])[2][1:])
+
+
 def _pieces(
     plane: Plane, points: Points, tolerance: float, cell: float
 ) -> tuple[NDArray[np.float64], int, list[NDArray[np.float64]]]:
     """Axes of a plane's plan, how many of points (n, 3) are near it, and the plan points (m, 2) of
     each piece of it that hangs together, the largest first."""
-    axes = np.linalg.svd(plane.normal[None])[2][1:]
+    axes = axes_of(plane)
     near = points[np.abs(plane.signed_distance(points)) < tolerance]
     return axes, len(near), _hanging_together(near @ axes.T, cell) if len(near) else []
 
@@ -138,7 +143,7 @@ def largest_planes(
             plane: Plane | None = first
         else:
             own = ransac.drawing(len(rest) / len(points))
-            plane = _largest(rest, child_seed(seed, "table", index), own)
+            plane = largest_of(rest, child_seed(seed, "table", index), own)
         if plane is None:
             break
         inlier = np.abs(plane.signed_distance(rest)) < ransac.tolerance
@@ -151,7 +156,8 @@ def largest_planes(
     return sorted(planes, key=lambda pair: -pair[1])
 
 
-def _largest(points: NDArray[np.float64], seed: int, ransac: Ransac) -> Plane | None:
+def largest_of(points: NDArray[np.float64], seed: int, ransac: Ransac) -> Plane | None:
+    """The plane with most of points (n, 3), metres, camera frame; None where there is none."""
     model = largest_plane(points, seed, **asdict(ransac))
     if model is None:
         return None

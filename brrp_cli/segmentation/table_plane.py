@@ -11,6 +11,7 @@ from brrp_cli.config.table import BinsConfig, TableConfig
 from brrp_cli.errors import FrameError
 from brrp_cli.hulls import beyond_hull, in_hull
 from brrp_cli.observation.borne import bearing
+from brrp_cli.observation.lowered import lowered
 from brrp_cli.observation.patches import Ransac, largest_planes, patch_with_hidden
 from brrp_cli.observation.support_plane import Plane
 from brrp_cli.observation.walls import Board, Wall, board_over, walls_of
@@ -99,12 +100,9 @@ def find_table(
     if len(points) > config.points:
         drawn = child_rng(seed, "table").choice(len(points), config.points, replace=False)
         points = points[drawn]
-    planes = largest_planes(
-        np.asarray(points, dtype=np.float64),
-        seed,
-        config.support,
-        Ransac(config.tolerance, config.iterations, config.ransac_points, config.min_points),
-    )
+    exact = np.asarray(points, dtype=np.float64)
+    ransac = Ransac(config.tolerance, config.iterations, config.ransac_points, config.min_points)
+    planes = largest_planes(exact, seed, config.support, ransac)
     if not planes or planes[0][1] < config.least * len(points):
         raise FrameError(
             "No support plane was found",
@@ -114,12 +112,15 @@ def find_table(
             fix="check the unit of depth (--depth-scale), take the picture so that more of the"
             " table is seen, or pass masks with --masks",
         )
+    number = _above_the_floor(planes, config)
+    plane, count = planes[number]
+    planes[number] = lowered(plane, exact, seed, config.heap, ransac), count
     patches = {
-        number: patch
-        for number, (plane, _) in enumerate(planes)
+        index: patch
+        for index, (plane, _) in enumerate(planes)
         if (patch := patch_with_hidden(plane, points, config.tolerance, config.support)) is not None
     }
-    usual = patches.get(_above_the_floor(planes, config))
+    usual = patches.get(number)
     if usual is None:
         raise FrameError("The support plane has no extent", where=source)
     found = list(patches.values())
