@@ -5,8 +5,8 @@
 For each set of scenes (published layout, as tools/make_scenes.py writes it), over the true objects
 that the prior holds, of which the first view has 1,000 pixels of depth or more and which the
 image's border does not cut: how many are recognised after masks were mended, by what the mask was
-before that. Those that the border cuts have a line of their own. --truth takes the true masks
-instead.
+before that. Of a frame in which nothing is found all are missing. Those that the border cuts have a
+line of their own. --truth takes the true masks instead.
 
 own      a mask of its own, IoU over 0.75
 shared   its mask holds another object, too: a quarter of the mask, or 40 % of that object
@@ -43,7 +43,7 @@ from shown_object import shown_object
 
 from brrp_cli.config.segmentation import SegmentConfig
 from brrp_cli.dependencies import import_open3d
-from brrp_cli.errors import BrrpError
+from brrp_cli.errors import BrrpError, FrameError
 from brrp_cli.evaluation.bootstrap import mean_interval
 from brrp_cli.evaluation.calibration import expected_calibration_error
 from brrp_cli.frames.frame import Frame
@@ -110,14 +110,19 @@ def rows_of(
     """A row for each object that the prior holds, and one for each mask taken for one."""
     frame = scene.view(0)
     start = time.perf_counter()
-    masks = frame.segmap if given else segment_and_aside(frame)[0]
-    seconds = time.perf_counter() - start
-    unmasked = replace(frame, segmap=np.zeros_like(frame.segmap))
-    result = again(frame if given else unmasked)
-    told = {
-        item.object_id: shown_object(result.frame.segmap == item.object_id, frame)
-        for item in result.objects
-    }
+    masks, seconds = frame.segmap, 0.0
+    nothing = np.zeros_like(masks)
+    try:
+        if not given:
+            masks = nothing
+            masks = segment_and_aside(frame)[0]
+            seconds = time.perf_counter() - start
+        result = again(frame if given else replace(frame, segmap=nothing))
+        mended, items = result.frame.segmap, result.objects
+    except FrameError as error:
+        print(f"{scene.name}: {error}", file=sys.stderr)
+        mended, items = nothing, []
+    told = {item.object_id: shown_object(mended == item.object_id, frame) for item in items}
     rows: list[Row] = []
     for object_id in frame.object_ids:
         name = scene.object(object_id).name
@@ -128,7 +133,7 @@ def rows_of(
         why, others = cause(frame.segmap[frame.valid], masks[frame.valid], object_id)
         found = [
             item.recognised
-            for item in result.objects
+            for item in items
             if item.recognised is not None
             and item.recognised.name == name
             and told[item.object_id] == object_id
@@ -148,7 +153,7 @@ def rows_of(
                 "seconds": seconds,
             }
         )
-    for item in result.objects:
+    for item in items:
         if (taken := item.recognised) is None:
             continue
         true_id = told[item.object_id]
@@ -160,10 +165,10 @@ def rows_of(
                 "weight": taken.weight,
                 "is": true_name,
                 "stored": true_name in prior.names,
-                "pixels": int((result.frame.segmap == item.object_id).sum()),
+                "pixels": int((mended == item.object_id).sum()),
             }
         )
-    rows.append({"scene": scene.name, "masks": len(result.objects)})
+    rows.append({"scene": scene.name, "masks": len(items)})
     return rows
 
 
