@@ -71,7 +71,7 @@ class TableConfig:
     wall: WallConfig = field(default_factory=WallConfig)
     heap: HeapConfig = field(default_factory=HeapConfig)
     bare: BareConfig = field(default_factory=BareConfig)
-    lacking: float = share(0.3)
+    lacking: float = between(0.3, 0.0, 0.99)
 
 
 @dataclass(frozen=True)

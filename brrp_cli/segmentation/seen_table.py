@@ -11,7 +11,6 @@ from brrp_cli.config.observation import WallConfig
 from brrp_cli.config.segmentation import SegmentConfig
 from brrp_cli.hulls import beyond_hull
 from brrp_cli.observation.walls import Wall
-from brrp_cli.segmentation.bare_table import meets_plane
 from brrp_cli.segmentation.beyond_image import beyond_image
 from brrp_cli.segmentation.bins import find_bins
 from brrp_cli.segmentation.standing_beside import Seen, with_things_beside
@@ -49,7 +48,7 @@ def see_table(
     table = find_table(points[valid], seed, source, config.table)
     plan, height = table.plan(points), table.plane.signed_distance(points)
     beside = table.beside(plan)
-    walls, bare = config.table.wall, config.table.bare
+    walls = config.table.wall
     off = np.zeros(valid.shape, dtype=bool)
     for wall in table.walls:
         if wall.spans:
@@ -57,8 +56,8 @@ def see_table(
     if table.board is not None:
         off |= height > table.board.height - walls.near
     flat = (np.abs(height) < config.table.tolerance) & (beside <= 0)
-    crossing = table.plan(meets_plane(valid.shape, K, table.plane))
-    hull = with_things_beside(table.hull, flat, off, Seen(points, plan, height, crossing), bare)
+    seen = Seen(table, points, plan, height, beside, off, K)
+    hull = with_things_beside(seen, config.table.tolerance, config.table.bare)
     if hull is not table.hull:
         table = replace(table, hull=hull)
         beside = np.minimum(beside, table.beside(plan))

@@ -123,7 +123,7 @@ def _without(
     height = table.height(points)
     over, masked = np.zeros(frame.shape, dtype=bool), (segmap > 0) & frame.valid
     over[masked] = table.holds(table.plan(points[masked]), 0.0)
-    bare = bare_pixels(frame, segmap, table, config.table)
+    bare = bare_pixels(frame, segmap, height, table, config.table)
     # What hides its own foot, as from above, is not seen to hang.
     reasons = {
         i: reason

@@ -14,6 +14,8 @@ from numpy.typing import NDArray
 from brrp_cli.config.table import BareConfig
 from brrp_cli.dependencies import import_library
 from brrp_cli.hulls import convex_hull, in_hull
+from brrp_cli.segmentation.bare_table import meets_plane, pixel_rays
+from brrp_cli.segmentation.table_plane import Table
 
 Mask = NDArray[np.bool_]
 
@@ -23,31 +25,41 @@ EVERY = np.s_[::2, ::2]
 
 @dataclass(frozen=True)
 class Seen:
-    """What is seen of a plane and over it.
+    """What is seen of a table and over it.
 
-    points : (H, W, 3) metres, camera frame, NaN = no depth; plan : (H, W, 2) metres, on the plane;
-    height : (H, W) metres above it; crossing : (H, W, 2) metres, where sight crosses it, NaN where
-    it does not
+    points : (H, W, 3) metres, camera frame, NaN = no depth; plan : (H, W, 2) metres, on the table;
+    height : (H, W) metres above it; beside : (H, W) metres beside its hull; off : (H, W) pixels
+    that walls shut off; K : (3, 3) of the camera
     """
 
+    table: Table
     points: NDArray[np.floating]
     plan: NDArray[np.float64]
     height: NDArray[np.float64]
-    crossing: NDArray[np.float64]
+    beside: NDArray[np.float64]
+    off: Mask
+    K: NDArray[np.floating]
+
+    def crossing(self) -> NDArray[np.float64]:
+        """(n, 2) metres, where every pixel of `EVERY` looks at the table's plane; NaN if not."""
+        rays = pixel_rays((self.height.shape[0], self.height.shape[1]), self.K)[EVERY]
+        return self.table.plan(meets_plane(rays.reshape(-1, 3), self.table.plane))
 
 
-def with_things_beside(
-    hull: NDArray[np.float64], flat: Mask, off: Mask, seen: Seen, config: BareConfig
-) -> NDArray[np.float64]:
+def with_things_beside(seen: Seen, tolerance: float, config: BareConfig) -> NDArray[np.float64]:
     """The hull (m, 3) of a table, as far as what stands beside it shows that it goes on there.
 
-    flat : (H, W) its pixels; off : (H, W) those that walls shut off
+    tolerance : metres within which something is the table
     """
-    on = seen.plan[flat]
-    crossing = seen.crossing[EVERY].reshape(-1, 2)
+    hull = seen.table.hull
+    rises = (seen.height > config.rises) & (seen.height < config.high) & ~seen.off
+    if (rises & (seen.beside > 0)).sum() < config.pixels:
+        return hull
+    on = seen.plan[(np.abs(seen.height) < tolerance) & (seen.beside <= 0)]
+    crossing = seen.crossing()
     lacks = ~np.isfinite(seen.height[EVERY]).ravel()
     behind = (seen.height[EVERY] < -config.off).ravel()
-    for thing in _things(hull, off, seen, config):
+    for thing in _things(rises, seen, config):
         if in_hull(hull, thing, 0.0).mean() > config.inside:
             continue
         both = np.concatenate([on, thing])
@@ -61,13 +73,10 @@ def with_things_beside(
     return hull
 
 
-def _things(
-    hull: NDArray[np.float64], off: Mask, seen: Seen, config: BareConfig
-) -> list[NDArray[np.float64]]:
-    """Plan points (n, 2) of each thing that reaches down to the plane, or stands partly within the
-    hull: those nearest to it first."""
+def _things(rises: Mask, seen: Seen, config: BareConfig) -> list[NDArray[np.float64]]:
+    """Plan points (n, 2) of each thing that reaches down to the table, or stands partly on what is
+    seen of it: those first of which most does. rises : (H, W) pixels of things"""
     ndimage = import_library("scipy.ndimage")
-    rises = (seen.height > config.rises) & (seen.height < config.high) & ~off
     labels, _ = ndimage.label(rises & ~_jumps(seen.points, config.jump))
     things = []
     for label, window in enumerate(ndimage.find_objects(labels), start=1):
@@ -75,7 +84,7 @@ def _things(
         if mine.sum() < config.pixels:
             continue
         plan = seen.plan[window][mine]
-        within = in_hull(hull, plan, 0.0).mean()
+        within = (seen.beside[window][mine] <= 0).mean()
         lowest = np.percentile(seen.height[window][mine], config.lowest)
         if within > config.partly or lowest < config.foot:
             # Bled pixels lie far behind.

@@ -38,6 +38,10 @@ def beside(frame: Frame, object_id: int) -> float:
     return float(np.nanmedian(seen.beside[frame.segmap == object_id]))
 
 
+def bare_of(frame: Frame, table) -> np.ndarray:
+    return bare_pixels(frame, frame.segmap, table.height(frame.points), table, CONFIG.table)
+
+
 def test_things_on_a_bare_table_are_found():
     whole = photograph(THINGS, [TABLE], elevation=ELEVATION, distance=DISTANCE)
     frame = bare(whole)
@@ -70,9 +74,9 @@ def test_what_stands_on_another_table_is_no_part_of_this_one():
 def test_a_table_lacks_depth_where_it_is_bare():
     whole = photograph(THINGS, [TABLE], elevation=ELEVATION, distance=DISTANCE)
     table = see_table(whole.points, whole.K, 0, None, CONFIG).table
-    assert not bare_pixels(whole, whole.segmap, table, CONFIG.table).any()
+    assert not bare_of(whole, table).any()
     frame = bare(whole)
-    found = bare_pixels(frame, frame.segmap, table, CONFIG.table)
+    found = bare_of(frame, table)
     lacking = ~frame.valid & (frame.segmap == 0)
     on_table = table.beside(table.plan(whole.points)) <= 0
     assert (found ^ (lacking & on_table)).sum() < 0.01 * lacking.sum()
@@ -80,4 +84,4 @@ def test_a_table_lacks_depth_where_it_is_bare():
     hidden = np.zeros(whole.shape, bool)
     hidden[100:120] = True
     little = without_depth(whole, hidden & (whole.segmap == 0))
-    assert not bare_pixels(little, little.segmap, table, CONFIG.table).any()
+    assert not bare_of(little, table).any()
