@@ -77,10 +77,8 @@ def bearing(
         return usual
     whole = [each for each in patches if each.is_whole(points, config)]
     # What goes through a heap tells no directions, nor does the face of a thing near the camera.
-    main = next((each for each in whole if each is usual and each.across >= config.across), None)
-    if main is None:
-        wide = [each for each in whole if each.across >= config.across]
-        main = max(wide, key=lambda each: each.count, default=usual)
+    wide = [each for each in whole if each.across >= config.across]
+    main = usual if _holds(wide, usual) else max(wide, key=lambda e: e.count, default=usual)
     large: list[Patch] = []
     for each in sorted(whole, key=lambda e: -e.count):
         # What lies a little over a larger one is faces of what stands on that.
@@ -89,7 +87,7 @@ def bearing(
             and all(_are_apart(each, other, points, config) for other in large)
         ):
             large.append(each)
-    asked = large if not _holds(whole, usual) or _holds(large, usual) else [*large, usual]
+    asked = [*large, usual] if _holds(whole, usual) and not _holds(large, usual) else large
     if things is None:
         things = _off_all(asked, points, config.off)
     bears = {id(each): _bears(each, things, config) for each in asked}

@@ -6,6 +6,8 @@ CVPR 2014): a can on a table, two boxes side by side. Within one thing hollow cr
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -86,13 +88,22 @@ def _sum_of_products(first: Array, second: Array) -> Array:
 
 def depth_jumps(depth: Array, K: Array, config: ConcaveEdgesConfig) -> NDArray[np.bool_]:
     """(H, W) pixels beside which depth (H, W), metres, jumps: steeper than a surface is seen."""
-    jumps = np.zeros(depth.shape, dtype=bool)
+    allowed = []
     for axis, focal in ((0, K[1, 1]), (1, K[0, 0])):
         near = np.moveaxis(depth, axis, 0)
-        marked = np.moveaxis(jumps, axis, 0)
+        width = np.minimum(near[1:], near[:-1]) / focal
+        allowed.append(np.maximum(config.steep * width, config.jump))
+    return depth_steps(depth, allowed)
+
+
+def depth_steps(depth: Array, allowed: Sequence[Array | float]) -> NDArray[np.bool_]:
+    """(H, W) pixels from which depth (H, W), metres, changes to the next one by more than is
+    allowed: metres (H - 1, W) down and (W - 1, H) across, or one number each."""
+    steps = np.zeros(depth.shape, dtype=bool)
+    for axis, most in enumerate(allowed):
+        near, marked = np.moveaxis(depth, axis, 0), np.moveaxis(steps, axis, 0)
         with np.errstate(invalid="ignore"):
-            width = np.minimum(near[1:], near[:-1]) / focal
-            steep = np.abs(near[1:] - near[:-1]) > np.maximum(config.steep * width, config.jump)
+            steep = np.abs(near[1:] - near[:-1]) > most
         marked[1:] |= steep
         marked[:-1] |= steep
-    return jumps
+    return steps

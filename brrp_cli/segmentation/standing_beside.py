@@ -15,6 +15,7 @@ from brrp_cli.config.table import BareConfig
 from brrp_cli.dependencies import import_library
 from brrp_cli.hulls import convex_hull, in_hull
 from brrp_cli.segmentation.bare_table import meets_plane, pixel_rays
+from brrp_cli.segmentation.concave_edges import depth_steps
 from brrp_cli.segmentation.table_plane import Table
 
 Mask = NDArray[np.bool_]
@@ -77,7 +78,8 @@ def _things(rises: Mask, seen: Seen, config: BareConfig) -> list[NDArray[np.floa
     """Plan points (n, 2) of each thing that reaches down to the table, or stands partly on what is
     seen of it: those first of which most does. rises : (H, W) pixels of things"""
     ndimage = import_library("scipy.ndimage")
-    labels, _ = ndimage.label(rises & ~_jumps(seen.points, config.jump))
+    steps = depth_steps(seen.points[..., 2], (config.jump, config.jump))
+    labels, _ = ndimage.label(rises & ~steps)
     things = []
     for label, window in enumerate(ndimage.find_objects(labels), start=1):
         mine = labels[window] == label
@@ -91,16 +93,3 @@ def _things(rises: Mask, seen: Seen, config: BareConfig) -> list[NDArray[np.floa
             low, high = np.percentile(plan, (config.bled, 100 - config.bled), axis=0)
             things.append((-within, plan[((plan >= low) & (plan <= high)).all(axis=-1)]))
     return [plan for _, plan in sorted(things, key=lambda pair: pair[0])]
-
-
-def _jumps(points: NDArray[np.floating], jump: float) -> Mask:
-    """(H, W) pixels beside which depth jumps by more than `jump` metres."""
-    depth = points[..., 2]
-    jumps = np.zeros(depth.shape, dtype=bool)
-    for axis in (0, 1):
-        near, marked = np.moveaxis(depth, axis, 0), np.moveaxis(jumps, axis, 0)
-        with np.errstate(invalid="ignore"):
-            steep = np.abs(near[1:] - near[:-1]) > jump
-        marked[1:] |= steep
-        marked[:-1] |= steep
-    return jumps
