@@ -26,6 +26,8 @@ scenes than a set without it.
 set without it.
 `--shelf` lets them stand in a compartment of a shelf, which is background, with cameras before it:
 `--elevation 5 30` sees in. It draws other scenes than a set without it.
+`--dark-table` makes the table, or what a shelf stands on, black and shiny. Depth and colours differ
+from a set without it.
 `--distance`, `--elevation` and `--roll` say where cameras stand: `--elevation 70 89` looks down,
 `--distance 0.3 0.5` is a camera at a wrist, which `--roll -180 180` turns about its line of sight.
 

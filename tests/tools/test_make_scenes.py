@@ -252,6 +252,26 @@ def test_a_sensor_changes_depth_alone_and_repeats_its_bytes(data, made):
     assert len(depths) == 3
 
 
+def test_a_dark_table_is_black_and_has_less_depth(data, tmp_path):
+    seen = {}
+    for name, dark in (("usual", ()), ("dark", ("--dark-table",))):
+        options = ("--scenes", 1, "--sensor", "xtion", *dark)
+        result = generate(data, tmp_path / name, *options)
+        assert result.exit_code == 0, result.output
+        folder = tmp_path / name / "00000000"
+        view = {file: np.load(folder / "0000" / f"{file}.npy") for file in ("depth", "seg_mask")}
+        rgb = np.asarray(Image.open(folder / "0000" / "rgb.jpg"))
+        seen[name] = ((folder / "objects.json").read_bytes(), view, rgb)
+    (poses, usual, bright), (same, dark, black) = seen["usual"], seen["dark"]
+    assert poses == same
+    np.testing.assert_array_equal(usual["seg_mask"], dark["seg_mask"])
+    table = (usual["seg_mask"] == 0) & (usual["depth"] < 1)
+    assert black[table].mean() < 0.3 * bright[table].mean()
+    assert (dark["depth"] < 1)[table].mean() < 0.8
+    things = (usual["seg_mask"] > 0) & (usual["depth"] < 1)
+    assert (dark["depth"] < 1)[things].mean() > 0.9
+
+
 def test_noise_and_sensor_exclude_each_other(data, tmp_path):
     both = generate(data, tmp_path / "s", "--noise", "structured-light", "--sensor", "xtion")
     assert both.exit_code == 2
