@@ -45,8 +45,7 @@ class Patch:
         """How many of points (n, 3), metres, camera frame, are seen behind it, more than `off`
         metres from its plane and from its outline: none, if it is one surface."""
         behind = points[self.plane.signed_distance(points) < -off]
-        crossing = behind * (-self.plane.offset / (behind @ self.plane.normal))[:, None]
-        return int(in_hull(self.hull, self.plan(crossing), -off).sum())
+        return int(in_hull(self.hull, self.plan(self.plane.met_by(behind)), -off).sum())
 
 
 @dataclass(frozen=True)

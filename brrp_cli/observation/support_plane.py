@@ -27,6 +27,13 @@ class Plane:
         """(...,) metres above the plane of points (..., 3), camera frame."""
         return np.asarray(points @ self.normal + self.offset, dtype=np.float64)
 
+    def met_by(self, directions: NDArray[np.floating]) -> NDArray[np.float64]:
+        """Points (..., 3), metres, camera frame, where the camera's sight in directions (..., 3)
+        meets the plane; NaN where it does not."""
+        down = directions @ self.normal
+        far = np.where(down < 0, -self.offset / np.where(down < 0, down, -1.0), np.nan)
+        return np.asarray(directions * far[..., None], dtype=np.float64)
+
 
 def fit_plane(
     points: NDArray[np.floating],

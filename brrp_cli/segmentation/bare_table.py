@@ -8,7 +8,6 @@ from numpy.typing import NDArray
 from brrp_cli.config.table import TableConfig
 from brrp_cli.frames.frame import BACKGROUND, Frame
 from brrp_cli.geometry import backproject
-from brrp_cli.observation.support_plane import Plane
 from brrp_cli.segmentation.table_plane import Table
 
 
@@ -27,23 +26,11 @@ def bare_pixels(
     free = segmap == BACKGROUND
     bare = free & ~frame.valid
     flat = int((free & (np.abs(height) < config.tolerance)).sum())
-    # Fewer than that lack depth anywhere.
-    if bare.sum() >= config.lacking / (1 - config.lacking) * flat:
-        plan = table.plan(meets_plane(pixel_rays(frame.shape, frame.K)[bare], table.plane))
-        bare[bare] = table.holds(plan, 0.0)
-    if bare.sum() < config.lacking / (1 - config.lacking) * flat:
+    least = config.lacking / (1 - config.lacking) * flat
+    # Fewer than that lack depth anywhere: then nothing needs to be asked.
+    if bare.sum() >= least:
+        sight = backproject(np.ones(frame.shape), frame.K)[bare]
+        bare[bare] = table.holds(table.plan(table.plane.met_by(sight)), 0.0)
+    if bare.sum() < least:
         bare[:] = False
     return bare
-
-
-def pixel_rays(shape: tuple[int, int], K: NDArray[np.floating]) -> NDArray[np.float64]:
-    """Directions (H, W, 3), with z = 1, in which pixels look."""
-    return backproject(np.ones(shape), K).astype(np.float64)
-
-
-def meets_plane(rays: NDArray[np.float64], plane: Plane) -> NDArray[np.float64]:
-    """Points (..., 3), metres, camera frame, where rays (..., 3) meet a plane; NaN where they do
-    not."""
-    down = rays @ plane.normal
-    far = np.where(down < 0, -plane.offset / np.where(down < 0, down, -1.0), np.nan)
-    return np.asarray(rays * far[..., None])

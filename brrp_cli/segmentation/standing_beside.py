@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from brrp_cli.config.table import BareConfig
 from brrp_cli.dependencies import import_library
+from brrp_cli.geometry import backproject
 from brrp_cli.hulls import convex_hull, in_hull
-from brrp_cli.segmentation.bare_table import meets_plane, pixel_rays
 from brrp_cli.segmentation.concave_edges import depth_steps
 from brrp_cli.segmentation.table_plane import Table
 
@@ -43,8 +43,8 @@ class Seen:
 
     def crossing(self) -> NDArray[np.float64]:
         """(n, 2) metres, where every pixel of `EVERY` looks at the table's plane; NaN if not."""
-        rays = pixel_rays((self.height.shape[0], self.height.shape[1]), self.K)[EVERY]
-        return self.table.plan(meets_plane(rays.reshape(-1, 3), self.table.plane))
+        sight = backproject(np.ones(self.height.shape), self.K)[EVERY].reshape(-1, 3)
+        return self.table.plan(self.table.plane.met_by(sight))
 
 
 def with_things_beside(seen: Seen, tolerance: float, config: BareConfig) -> NDArray[np.float64]:

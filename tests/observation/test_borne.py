@@ -91,8 +91,7 @@ def test_the_face_of_a_near_thing_is_no_table_however_many_pixels_show_it():
 
     # It hides what of the table lies behind it.
     floor = square(1.0, 0.8, step=0.01)
-    crossing = floor * (-near.plane.offset / (floor @ near.plane.normal))[:, None]
-    hidden = in_hull(near.hull, near.plan(crossing), 0.0)
+    hidden = in_hull(near.hull, near.plan(near.plane.met_by(floor)), 0.0)
     points = np.concatenate([face, floor[~hidden], post])
     patches = [patch_of(near.plane, points, 0.01, 0.02), facing(1.0, points)]
     assert patches[0].count > patches[1].count

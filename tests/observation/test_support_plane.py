@@ -61,3 +61,11 @@ def test_where_nothing_is_seen_around_the_thing_it_stays():
     far = np.abs(background[:, 0]) > 0.2
     assert floor_beneath(TABLE, background[far], thing, CONFIG) is TABLE
     assert floor_beneath(TABLE, background, thing[:0], CONFIG) is TABLE
+
+
+def test_sight_meets_a_plane_before_the_camera_and_none_behind_it():
+    plane = Plane(np.array([0.0, -0.6, -0.8]), 0.8)
+    met = plane.met_by(np.array([[0.0, 0.0, 1.0], [0.3, 1.0, 0.25], [0.0, -1.0, 0.1]]))
+    np.testing.assert_allclose(met[:2], [[0.0, 0.0, 1.0], [0.3, 1.0, 0.25]])
+    np.testing.assert_allclose(plane.signed_distance(met[:2]), 0.0, atol=1e-12)
+    assert np.isnan(met[2]).all()

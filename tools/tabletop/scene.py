@@ -40,6 +40,7 @@ LIMITS = {"none": CLEAN, "structured-light": STRUCTURED_LIGHT}
 LIGHTS = ("plain", "varied")
 SENSOR_NAMES = ("none", "stereo", "xtion", "kinect-azure")
 JPEG_QUALITY = 95
+DARK_TABLE = 0.15  # how bright it is, of a usual one
 
 
 @dataclass(frozen=True)
@@ -92,7 +93,7 @@ def make_scene(plan: Plan, number: int, check: bool) -> list[Distance]:
     rng = child_rng(plan.seed, "scene", number, "views")
     look = draw_look(len(models), rng)
     if plan.dark_table:
-        look = replace(look, table_color=0.15 * look.table_color)
+        look = replace(look, table_color=DARK_TABLE * look.table_color)
     centers = [pose.apply(model.center[None])[0] for pose, model in zip(poses, models, strict=True)]
     center = np.mean(centers, axis=0)
     azimuth = (0.0, 2 * np.pi) if shelf is None else shelf.azimuth
