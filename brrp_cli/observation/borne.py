@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 
 from brrp_cli.config.observation import ObservationConfig, SupportConfig
 from brrp_cli.geometry import IMAGE_UP, lengths
-from brrp_cli.hulls import in_hull
 from brrp_cli.observation.patches import Patch, Ransac, largest_planes, patch_with_hidden
 from brrp_cli.observation.support_plane import Plane, fit_plane
 from brrp_cli.seeds import child_rng, child_seed
@@ -153,7 +152,7 @@ def standing_on(patch: Patch, things: Points, config: SupportConfig) -> tuple[in
     frame, these are: the lowest in a cell is within `config.low` of the patch."""
     height = patch.plane.signed_distance(things)
     above = (height > 0) & (height < config.high)
-    above[above] = in_hull(patch.hull, patch.plan(things[above]), config.off)
+    above[above] = patch.holds(patch.plan(things[above]), config.off)
     if not above.any():
         return 0, 0
     cells = np.floor(patch.plan(things[above]) / config.cell).astype(np.int64)

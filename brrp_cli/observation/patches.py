@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 
 from brrp_cli.config.observation import SupportConfig
 from brrp_cli.dependencies import import_library
-from brrp_cli.hulls import convex_hull, in_hull
+from brrp_cli.hulls import convex_hull
+from brrp_cli.observation.outlined import Outlined
 from brrp_cli.observation.support_plane import Plane, largest_plane
 from brrp_cli.seeds import child_seed
 
@@ -17,24 +18,14 @@ Points = NDArray[np.floating]
 
 
 @dataclass(frozen=True)
-class Patch:
+class Patch(Outlined):
     """The part of a plane that hangs together.
 
-    plane : the camera's side is positive
-    axes : (2, 3) unit, spanning the plane: plan coordinates are points @ axes.T
-    hull : (m, 3) plan points p with hull[:, :2] @ p + hull[:, 2] <= 0 lie within it
     count : points near the plane; across : metres between the ends of its hull
     """
 
-    plane: Plane
-    axes: NDArray[np.float64]
-    hull: NDArray[np.float64]
     count: int
     across: float
-
-    def plan(self, points: Points) -> NDArray[np.float64]:
-        """Plan coordinates (..., 2), metres, of points (..., 3), camera frame."""
-        return np.asarray(points @ self.axes.T, dtype=np.float64)
 
     def is_whole(self, points: Points, config: SupportConfig) -> bool:
         """Whether next to nothing of points (n, 3), metres, camera frame, is seen behind it: not so
@@ -45,7 +36,7 @@ class Patch:
         """How many of points (n, 3), metres, camera frame, are seen behind it, more than `off`
         metres from its plane and from its outline: none, if it is one surface."""
         behind = points[self.plane.signed_distance(points) < -off]
-        return int(in_hull(self.hull, self.plan(self.plane.met_by(behind)), -off).sum())
+        return int(self.holds(self.plan(self.plane.met_by(behind)), -off).sum())
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from brrp_cli.config.observation import SupportConfig, WallConfig
 from brrp_cli.geometry import normalise
-from brrp_cli.hulls import in_hull
 from brrp_cli.observation.patches import Patch, patch_of
 
 Array = NDArray[np.floating]
@@ -108,14 +107,14 @@ def board_over(
             continue
         below = near - height * table.plane.normal
         shadow = patch_of(table.plane, below, config.near, config.cell)
-        if shadow is not None and in_hull(shadow.hull, flat, 0.0).mean() >= config.covers:
+        if shadow is not None and shadow.holds(flat, 0.0).mean() >= config.covers:
             found.append(Board(patch, height if alike < 0 else height - config.board))
     return min(found, key=lambda board: board.height, default=None)
 
 
 def _on(table: Patch, points: Array, near: float) -> Array:
     flat = points[np.abs(table.plane.signed_distance(points)) < near]
-    return flat[in_hull(table.hull, table.plan(flat), 0.0)]
+    return flat[table.holds(table.plan(flat), 0.0)]
 
 
 def _covers(some: Array, others: Array, cell: float) -> float:

@@ -12,6 +12,7 @@ from brrp_cli.errors import FrameError
 from brrp_cli.hulls import beyond_hull, in_hull
 from brrp_cli.observation.borne import bearing
 from brrp_cli.observation.lowered import lowered
+from brrp_cli.observation.outlined import Outlined
 from brrp_cli.observation.patches import Ransac, largest_planes, patch_with_hidden
 from brrp_cli.observation.support_plane import Plane
 from brrp_cli.observation.walls import Board, Wall, board_over, walls_of
@@ -20,34 +21,21 @@ from brrp_cli.segmentation.bins import Bin
 
 
 @dataclass(frozen=True)
-class Table:
+class Table(Outlined):
     """A support plane with its extent.
 
-    plane : the objects' side, which is the camera's, is positive
-    axes : (2, 3) float64, unit, spanning the plane: plan coordinates are points @ axes.T
-    hull : (m, 3) float64: plan points p with hull[:, :2] @ p + hull[:, 2] <= 0 lie on the table
     bins : on the table; they count as part of it
     walls : at which it ends; board : over it
     """
 
-    plane: Plane
-    axes: NDArray[np.float64]
-    hull: NDArray[np.float64]
     bins: tuple[Bin, ...] = ()
     walls: tuple[Wall, ...] = ()
     board: Board | None = None
 
-    def plan(self, points: NDArray[np.floating]) -> NDArray[np.float64]:
-        """Plan coordinates (..., 2), metres, of points (..., 3), camera frame."""
-        return np.asarray(points @ self.axes.T, dtype=np.float64)
-
-    def holds(self, plan: NDArray[np.floating], margin: float) -> NDArray[np.bool_]:
-        """(n,) whether plan points (n, 2) lie on the table or at most `margin` beside it."""
-        return in_hull(self.hull, plan, margin)
-
-    def beside(self, plan: NDArray[np.floating]) -> NDArray[np.float64]:
-        """(...,) how far beside the table plan points (..., 2) lie, metres; 0 or less on it."""
-        return beyond_hull(self.hull, plan.reshape(-1, 2)).reshape(plan.shape[:-1])
+    @property
+    def walled(self) -> bool:
+        """Whether a bin stands on it, or a wall or a shelf shuts it off."""
+        return bool(self.bins) or self.board is not None or any(w.spans for w in self.walls)
 
     def height(self, points: NDArray[np.floating]) -> NDArray[np.float64]:
         """(...,) metres above the table, or above the floor of a bin, of points (..., 3)."""
