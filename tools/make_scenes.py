@@ -20,8 +20,8 @@ bleeding silhouettes, steps and holes (docs/sensors.md); it takes the place of `
 what stands where stays as it is.
 `--stack` drops every second object onto the one before it, which stands with its open side up
 where it has one: can on can, jar in bowl. It draws other scenes than a set without it.
-`--bin` lets them lie in a bin of any size, which is background, as the table is. It draws other
-scenes than a set without it.
+`--platform` lets them lie on a board of any size, 3 to 30 mm thick, which is background, as the
+table is, and `--bin` in a bin. Both draw other scenes than a set without them.
 `--wall` puts a wall behind the objects, which is background, too. Depth and colours differ from a
 set without it.
 `--shelf` lets them stand in a compartment of a shelf, which is background, with cameras before it:
@@ -94,6 +94,7 @@ def _size(_context: click.Context, _option: click.Parameter, value: str) -> tupl
 @click.option("--sensor", default="none", show_default=True, type=click.Choice(SENSOR_NAMES))
 @click.option("--light", default="plain", show_default=True, type=click.Choice(list(LIGHTS)))
 @click.option("--stack", "stacked", is_flag=True, help="Set objects on and into one another.")
+@click.option("--platform", "on_platform", is_flag=True, help="Drop objects onto a platform.")
 @click.option("--bin", "binned", is_flag=True, help="Drop objects into a bin.")
 @click.option("--wall", "walled", is_flag=True, help="Put a wall behind them.")
 @click.option("--shelf", "shelved", is_flag=True, help="Stand objects in a shelf.")
@@ -140,6 +141,7 @@ def main(
     sensor: str,
     light: str,
     stacked: bool,
+    on_platform: bool,
     binned: bool,
     walled: bool,
     shelved: bool,
@@ -159,8 +161,8 @@ def main(
             raise click.UsageError(
                 "--noise and --sensor exclude each other: a sensor brings its own"
             )
-        if sum((stacked, binned, shelved)) > 1:
-            raise click.UsageError("--stack, --bin and --shelf exclude one another")
+        if sum((stacked, on_platform, binned, shelved)) > 1:
+            raise click.UsageError("--stack, --platform, --bin and --shelf exclude one another")
         if walled and (binned or shelved or views > 1):
             raise click.UsageError("--wall takes --views 1, whose back it is, no --bin or --shelf")
         if data_root is None:
@@ -192,6 +194,7 @@ def main(
             light,
             sensor,
             stacked,
+            on_platform,
             binned,
             walled,
             shelved,

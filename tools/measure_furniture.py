@@ -1,15 +1,15 @@
-"""Where do walls of bins and shelves seem to be, and do hands keep out of the true ones?
+"""Where do walls of bins and shelves, and platforms, seem to be, and do hands keep out of them?
 
     python tools/measure_furniture.py SCENES... [--prior PRIOR] [--scenes N]
 
-For each set of scenes that `tools/make_scenes.py` wrote with `--bin` or `--shelf`, in the first
-view of each; true masks tell what the objects stand on:
+For each set of scenes that `tools/make_scenes.py` wrote with `--bin`, `--platform` or `--shelf`, in
+the first view of each; true masks tell what the objects stand on:
 
-bins     or shelves: scenes in which one is found
-walls    walls, and boards above, that have a model, of those of which the image shows most (what is
-         in front of them does not count)
+bins     platforms or shelves: scenes in which one is found
+walls    walls, boards above and platforms that have a model, of those of which the image shows most
+         (what is in front of them does not count)
 off      median and 90 % of how far models lie from the true walls: of a bin at the rim and at the
-         foot, of a shelf the face that is seen
+         foot, of a shelf the face that is seen, of a platform its upper face
 false    models, of all, of which a part is more than 3 cm from any true wall; they are not in `off`
 
 With --prior, objects are reconstructed from true masks and grasps are planned (default hand):
@@ -49,7 +49,7 @@ from brrp_cli.session import Reconstructor
 
 FALSE = 0.03
 STEPS = 9
-KINDS = {"bin": "bins", "shelf": "shelves"}
+KINDS = {"bin": "bins", "platform": "platforms", "shelf": "shelves"}
 # Points on each true wall, against which hands are held.
 POINTS = 4_000
 
@@ -91,7 +91,7 @@ def measure_walls(scene: Scene, walls: list[trimesh.Trimesh], found: Found) -> N
     frame = scene.view(0)
     around = furniture(frame, scene_plane(frame, ObservationConfig(), 0), 0, SegmentConfig())
     models = [bin_points(wall) for each in around.bins for wall in each]
-    models += [face_points(slab) for slab in around.walls]
+    models += [face_points(slab) for slab in (*around.walls, *around.platforms)]
     found.scenes += 1
     found.found += bool(models)
     own = set()

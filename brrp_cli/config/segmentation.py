@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 from brrp_cli.config.mending import MendConfig, RegroupConfig
 from brrp_cli.config.ranges import between, share
-from brrp_cli.config.table import BinsConfig, TableConfig
+from brrp_cli.config.table import BinsConfig, PlatformsConfig, TableConfig
 
 
 @dataclass(frozen=True)
@@ -254,6 +254,7 @@ class SegmentConfig:
     smooth_depth: SmoothDepthConfig = field(default_factory=SmoothDepthConfig)
     table: TableConfig = field(default_factory=TableConfig)
     bins: BinsConfig = field(default_factory=BinsConfig)
+    platforms: PlatformsConfig = field(default_factory=PlatformsConfig)
     concave_edges: ConcaveEdgesConfig = field(default_factory=ConcaveEdgesConfig)
     components: ComponentsConfig = field(default_factory=ComponentsConfig)
     affinities: AffinitiesConfig = field(default_factory=AffinitiesConfig)

@@ -1,4 +1,4 @@
-"""The table of a frame without masks, and bins on it. Lengths are metres."""
+"""The table of a frame without masks, bins and platforms on it. Lengths are metres."""
 
 from __future__ import annotations
 
@@ -133,3 +133,35 @@ class BinsConfig:
     over: float = 0.015
     masked: float = share(0.5)
     board: float = 0.01
+
+
+@dataclass(frozen=True)
+class PlatformsConfig:
+    """Low platforms on which things lie: level regions a little above the table.
+
+    least_height, most_height, step : of the heights above the table that are tried; band : what is
+    that far above or below may be of the same one
+    area : of one, metres squared: more than boxes and plates have; shown : part of it that is
+    level; below : part of it that is lower, at most; rectangle : part of the one around it that is
+    filled, from which on it is one; gap : cells by which what is level is joined
+    lies : what rises more over it lies on it; filled : metres squared of that, or the platform is
+    empty, and a thing itself; walled : part of its edge that rises so, from which on it is a tray
+    ring : part of what lies around it that is seen, at least; table : part of that which is table
+    around : metres beside it that may be its edge
+    """
+
+    least_height: float = 0.004
+    most_height: float = 0.045
+    step: float = 0.002
+    band: float = 0.004
+    area: float = 0.045
+    shown: float = share(0.3)
+    below: float = share(0.1)
+    rectangle: float = share(0.8)
+    gap: int = between(2, 1, 16)
+    lies: float = 0.012
+    filled: float = 0.0004
+    walled: float = share(0.2)
+    ring: float = share(0.3)
+    table: float = share(0.6)
+    around: float = 0.01

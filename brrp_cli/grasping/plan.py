@@ -65,7 +65,7 @@ def plan_grasps(
     def shape(item: GraspObject) -> Mesh:
         return collision_shape(item, scene, config)
 
-    shapes = [*in_threads(shape, scene.objects, workers), *map(wall_mesh, scene.walls)]
+    shapes = [*in_threads(shape, scene.objects, workers), *map(wall_mesh, scene.solids)]
     planned = [
         _Task(item, i, scene, shapes, hand, config, approach, per_object, min_score, seed)
         for i, item in enumerate(scene.objects)

@@ -42,15 +42,15 @@ class GraspObject:
 class GraspScene:
     """objects : those that have a mesh; plane : the table, camera frame; without : why others have
     none, by id; loose : (n, 3) observed points of those, and of what stands around; surface : how
-    meshes were made; walls : corners (k, 3), convex, of the walls of bins and of what shuts the
-    table off, camera frame; hidden : behind what stands around"""
+    meshes were made; solids : corners (k, 3), convex, of platforms, the walls of bins and
+    what shuts the table off, camera frame; hidden : behind what stands around"""
 
     objects: list[GraspObject]
     plane: Plane | None
     without: dict[int, str]
     loose: Array
     surface: SurfaceConfig
-    walls: Sequence[Solid] = ()
+    solids: Sequence[Solid] = ()
     hidden: HiddenSpace = NOTHING_HIDDEN
 
     @property
@@ -101,8 +101,9 @@ def _stored(stored: StoredResult, around: SurroundingsConfig) -> GraspScene:
     }
     plane, masks = stored.plane_cam, segmentation_of(stored.record["segmentation"])
     loose, hidden = _loose(stored.frame, plane, objects, without, around, masks)
-    walls = furniture(stored.frame, plane, stored.record["seed"], masks).solids
-    return GraspScene(objects, plane, without, loose, stored.surface_config, walls, hidden)
+    found = furniture(stored.frame, plane, stored.record["seed"], masks)
+    table = None if plane is None else found.table(plane)
+    return GraspScene(objects, table, without, loose, stored.surface_config, found.solids, hidden)
 
 
 def _computed(result: Reconstruction, around: SurroundingsConfig) -> GraspScene:
@@ -120,10 +121,11 @@ def _computed(result: Reconstruction, around: SurroundingsConfig) -> GraspScene:
     without = {o.object_id: o.message or o.status for o in result.objects if o.surface is None}
     masks = segmentation_of(result.segmentation)
     loose, hidden = _loose(result.frame, result.plane, objects, without, around, masks)
-    table = result.configuration.get("surface", {})
-    surface = changed(SurfaceConfig(), table, "the reconstruction", "surface.")
-    walls = furniture(result.frame, result.plane, result.seed, masks).solids
-    return GraspScene(objects, result.plane, without, loose, surface, walls, hidden)
+    numbers = result.configuration.get("surface", {})
+    surface = changed(SurfaceConfig(), numbers, "the reconstruction", "surface.")
+    found = furniture(result.frame, result.plane, result.seed, masks)
+    plane = None if result.plane is None else found.table(result.plane)
+    return GraspScene(objects, plane, without, loose, surface, found.solids, hidden)
 
 
 def _loose(

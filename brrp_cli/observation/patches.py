@@ -149,11 +149,7 @@ def largest_planes(
 def largest_of(points: NDArray[np.float64], seed: int, ransac: Ransac) -> Plane | None:
     """The plane with most of points (n, 3), metres, camera frame; None where there is none."""
     model = largest_plane(points, seed, **asdict(ransac))
-    if model is None:
-        return None
-    # The camera's side is positive.
-    model = model if model[3] > 0 else -model
-    return Plane(model[:3], float(model[3]))
+    return None if model is None else Plane.facing_the_camera(model)
 
 
 def _hanging_together(plan: NDArray[np.float64], cell: float) -> list[NDArray[np.float64]]:

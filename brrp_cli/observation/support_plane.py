@@ -23,6 +23,13 @@ class Plane:
     normal: NDArray[np.float64]
     offset: float
 
+    @classmethod
+    def facing_the_camera(cls, model: NDArray[np.float64]) -> Plane:
+        """Of (4,) a x + b y + c z + d = 0, unit normal of either sign: the camera's side is
+        positive."""
+        model = model if model[3] > 0 else -model
+        return cls(model[:3].copy(), float(model[3]))
+
     def signed_distance(self, points: NDArray[np.floating]) -> NDArray[np.float64]:
         """(...,) metres above the plane of points (..., 3), camera frame."""
         return np.asarray(points @ self.normal + self.offset, dtype=np.float64)
@@ -144,11 +151,17 @@ def largest_plane(
         inliers = some[np.abs(some @ model[:3] + model[3]) < tolerance]
         if len(inliers) < (min_points if some is points else 3):
             return None
-        middle = inliers.mean(axis=0)
-        spread = inliers - middle
-        normal = np.linalg.eigh(spread.T @ spread)[1][:, 0]
-        model = np.append(normal, -normal @ middle)
+        model = nearest_plane(inliers)
     return model
+
+
+def nearest_plane(points: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The plane (4,) a x + b y + c z + d = 0, unit normal of either sign, of least squares of the
+    distances to points (n, 3)."""
+    middle = points.mean(axis=0)
+    spread = points - middle
+    normal = np.linalg.eigh(spread.T @ spread)[1][:, 0]
+    return np.append(normal, -normal @ middle)
 
 
 def plane_frame(plane: Plane) -> NDArray[np.float64]:

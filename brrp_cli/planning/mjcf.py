@@ -22,21 +22,23 @@ CLEARANCE = 0.0005  # metres between the table and what is put on it
 
 @dataclass(frozen=True)
 class Table:
-    """A box whose top is the support plane, the bins on it, and what shuts it off.
+    """A box whose top is the support plane, what stands on it, and what shuts it off.
 
     T_frame_table : (4, 4) of the box's centre, z its normal; size : (3,) metres, edge to edge
-    bins, walls : by name, corners (k, 3) of the walls of each, convex, metres, frame of the results
+    bins, walls, platforms : by name, corners (k, 3) of the solids of each, convex, metres, frame of
+    the results
     """
 
     T_frame_table: NDArray[np.float64]
     size: NDArray[np.float64]
     bins: Mapping[str, Sequence[NDArray[np.float64]]] = field(default_factory=dict)
     walls: Mapping[str, Sequence[NDArray[np.float64]]] = field(default_factory=dict)
+    platforms: Mapping[str, Sequence[NDArray[np.float64]]] = field(default_factory=dict)
 
     @property
     def furniture(self) -> dict[str, Sequence[NDArray[np.float64]]]:
-        """Bins and walls, by name."""
-        return {**self.bins, **self.walls}
+        """Bins, platforms and walls, by name."""
+        return {**self.bins, **self.platforms, **self.walls}
 
     @property
     def up(self) -> NDArray[np.float64]:

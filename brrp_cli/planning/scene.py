@@ -85,7 +85,8 @@ def upwards(stored: StoredResult) -> NDArray[np.float64]:
 def table_under(
     bodies: list[Body], plane: Plane | None, around: Furniture | None = None
 ) -> Table | None:
-    """A table whose top is the plane, under all bodies and bins; None without a plane.
+    """A table whose top is the plane, or lies below it where that is a platform's, under all
+    bodies, bins and platforms; None without a plane.
 
     around : what stands on it and shuts it off, frame of the results
     """
@@ -97,16 +98,20 @@ def table_under(
         [
             *(transform_points(b.T_frame_body, np.vstack(b.parts)) for b in bodies),
             *(wall for walls in around.bins for wall in walls),
+            *around.platforms,
         ]
     )
     local = corners @ axes
     low, high = local.min(axis=0) - TABLE_MARGIN, local.max(axis=0) + TABLE_MARGIN
     middle = (low + high) / 2
-    middle[2] = -plane.offset - TABLE_THICKNESS / 2
+    middle[2] = -around.table(plane).offset - TABLE_THICKNESS / 2
     size = np.array([*(high - low)[:2], TABLE_THICKNESS])
     bins = {f"bin_{number}": walls for number, walls in enumerate(around.bins, start=1)}
     walls = {f"wall_{number}": [wall] for number, wall in enumerate(around.walls, start=1)}
-    return Table(similarity(1.0, axes, axes @ middle), size, bins, walls)
+    platforms = {
+        f"platform_{number}": [solid] for number, solid in enumerate(around.platforms, start=1)
+    }
+    return Table(similarity(1.0, axes, axes @ middle), size, bins, walls, platforms)
 
 
 def furniture_around(stored: StoredResult) -> Furniture:

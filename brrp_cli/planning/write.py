@@ -194,6 +194,10 @@ def _record(
                 {"name": name, "walls": [wall.tolist() for wall in walls]}
                 for name, walls in table.bins.items()
             ],
+            "platforms": [
+                {"name": name, "corners": solid.tolist()}
+                for name, (solid,) in table.platforms.items()
+            ],
             "walls": [
                 {"name": name, "corners": wall.tolist()} for name, (wall,) in table.walls.items()
             ],

@@ -8,19 +8,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from brrp_cli.config.table import BinsConfig
 from brrp_cli.dependencies import import_library
-from brrp_cli.hulls import convex_hull, in_hull
+from brrp_cli.segmentation.plan_cells import AROUND, Cells, PlanCells
 from brrp_cli.segmentation.rectangles import rectangles
-
-Cells = NDArray[np.bool_]
-
-AROUND = np.ones((3, 3), dtype=bool)
 
 
 @dataclass(frozen=True)
@@ -40,36 +35,6 @@ class Bin:
 
 
 @dataclass(frozen=True)
-class _Plan:
-    """Cells of the plan: `tops` (h, w) metres of what is highest in each, -inf where nothing is
-    seen; `origin` (2,) of cell (0, 0)."""
-
-    tops: NDArray[np.float64]
-    origin: NDArray[np.float64]
-    cell: float
-
-    @cached_property
-    def middles(self) -> NDArray[np.float64]:
-        """(h w, 2) of the cells, metres."""
-        rows, columns = np.indices(self.tops.shape)
-        return self.origin + (np.stack([rows, columns], -1).reshape(-1, 2) + 0.5) * self.cell
-
-    @cached_property
-    def in_view(self) -> Cells:
-        """Cells that the image shows, or that something hides."""
-        hull = self.hull(np.isfinite(self.tops))
-        return np.zeros_like(self.tops, bool) if hull is None else self.filled(hull, -2 * self.cell)
-
-    def hull(self, cells: Cells) -> NDArray[np.float64] | None:
-        """(m, 3) around the middles of some cells."""
-        return convex_hull(self.middles[cells.ravel()])
-
-    def filled(self, hull: NDArray[np.float64], margin: float) -> Cells:
-        """The cells in a hull that is grown by `margin` metres."""
-        return in_hull(hull, self.middles, margin).reshape(self.tops.shape)
-
-
-@dataclass(frozen=True)
 class _Rim:
     """hull : (m, 3) around it; height : metres; length : cells of it that are there"""
 
@@ -78,22 +43,8 @@ class _Rim:
     length: int
 
 
-def find_bins(
-    plan: NDArray[np.floating], height: NDArray[np.floating], config: BinsConfig
-) -> tuple[Bin, ...]:
-    """The bins that points on and above the table show, those with the longest rim first.
-
-    plan : (n, 2) metres, on the table; height : (n,) metres above it
-    """
-    some = slice(None, None, max(len(plan) // config.points, 1))
-    plan, height = plan[some], height[some]
-    known = np.abs(height) < config.most_height
-    if not known.any():
-        return ()
-    points = np.asarray(plan[known], np.float64)
-    if np.ptp(points, axis=0).max() > config.widest:
-        return ()
-    cells = _cells(points, height[known], config.cell)
+def find_bins(cells: PlanCells, config: BinsConfig) -> tuple[Bin, ...]:
+    """The bins that points on and above the table show, those with the longest rim first."""
     bins: list[Bin] = []
     taken = np.zeros(cells.tops.shape, dtype=bool)
     for rim in sorted(_rings(cells, config), key=lambda rim: -rim.length):
@@ -107,15 +58,7 @@ def find_bins(
     return tuple(bins)
 
 
-def _cells(plan: NDArray[np.float64], height: NDArray[np.float64], cell: float) -> _Plan:
-    origin = plan.min(axis=0)
-    index = ((plan - origin) / cell).astype(np.int64)
-    tops = np.full(index.max(axis=0) + 1, -np.inf)
-    np.maximum.at(tops, (index[:, 0], index[:, 1]), height)
-    return _Plan(tops, origin, cell)
-
-
-def _rings(cells: _Plan, config: BinsConfig) -> Iterator[_Rim]:
+def _rings(cells: PlanCells, config: BinsConfig) -> Iterator[_Rim]:
     """What may be rims, at all heights."""
     for height in np.arange(config.least_height, config.most_height, config.step):
         band = np.abs(cells.tops - height) <= config.band
@@ -130,7 +73,7 @@ def _rings(cells: _Plan, config: BinsConfig) -> Iterator[_Rim]:
                 yield rim
 
 
-def _hulls(cells: _Plan, band: Cells, config: BinsConfig) -> Iterator[NDArray[np.float64]]:
+def _hulls(cells: PlanCells, band: Cells, config: BinsConfig) -> Iterator[NDArray[np.float64]]:
     """The hull (m, 3) of each group of cells of one height."""
     ndimage = import_library("scipy.ndimage")
     # Gaps of a few cells are pixels without depth.
@@ -144,7 +87,7 @@ def _hulls(cells: _Plan, band: Cells, config: BinsConfig) -> Iterator[NDArray[np
 
 
 def _rim(
-    cells: _Plan, band: Cells, hull: NDArray[np.float64], least: float, config: BinsConfig
+    cells: PlanCells, band: Cells, hull: NDArray[np.float64], least: float, config: BinsConfig
 ) -> _Rim | None:
     """The rim along a hull (m, 3), if most of it is there and what it encloses is hollow.
 
@@ -180,7 +123,7 @@ def _rim(
     return _Rim(hull, height, there)
 
 
-def _bin(cells: _Plan, rim: _Rim, config: BinsConfig) -> Bin | None:
+def _bin(cells: PlanCells, rim: _Rim, config: BinsConfig) -> Bin | None:
     """None where nothing lies in it: then it is a thing itself."""
     ndimage = import_library("scipy.ndimage")
     region = cells.filled(rim.hull, -config.cell)

@@ -15,7 +15,8 @@ from brrp_cli.config.tables import changed
 from brrp_cli.errors import ConfigError, FrameError
 from brrp_cli.frames.frame import BACKGROUND, Frame
 from brrp_cli.geometry import backproject, transform_points
-from brrp_cli.observation.patches import Patch
+from brrp_cli.hulls import in_hull
+from brrp_cli.observation.outlined import Outlined
 from brrp_cli.observation.support_plane import Plane
 from brrp_cli.segmentation.bin_walls import Solid, bins_of
 from brrp_cli.segmentation.outlines import corners_of, plain
@@ -32,12 +33,16 @@ Array = NDArray[np.float64]
 class Furniture:
     """Corners (k, 3) of convex solids, metres.
 
-    bins : the walls of each on the table; walls : those behind it, and the back, the sides and the
-    upper board of a shelf
+    bins : the walls of each on the table; platforms : on it; walls : those behind it, and the back,
+    the sides and the upper board of a shelf
+    beneath : metres by which the table lies below the plane that was asked about, which is that of
+    a platform on it
     """
 
     bins: list[list[Solid]] = field(default_factory=list)
     walls: list[Solid] = field(default_factory=list)
+    platforms: list[Solid] = field(default_factory=list)
+    beneath: float = 0.0
 
     def moved(self, T: Array) -> Furniture:
         """In another frame, by a rigid T (4, 4)."""
@@ -46,13 +51,20 @@ class Furniture:
             return np.asarray(transform_points(T, corners), dtype=np.float64)
 
         return Furniture(
-            [[move(wall) for wall in walls] for walls in self.bins], [*map(move, self.walls)]
+            [[move(wall) for wall in walls] for walls in self.bins],
+            [*map(move, self.walls)],
+            [*map(move, self.platforms)],
+            self.beneath,
         )
 
     @property
     def solids(self) -> list[Solid]:
         """All of them."""
-        return [wall for walls in (*self.bins, self.walls) for wall in walls]
+        return [solid for solids in (*self.bins, self.platforms, self.walls) for solid in solids]
+
+    def table(self, plane: Plane) -> Plane:
+        """The table's plane, where `plane` was asked about."""
+        return Plane(plane.normal, plane.offset + self.beneath)
 
 
 def furniture(frame: Frame, plane: Plane | None, seed: int, config: SegmentConfig) -> Furniture:
@@ -69,12 +81,25 @@ def furniture(frame: Frame, plane: Plane | None, seed: int, config: SegmentConfi
         log.info("No table was found, and so nothing around it: %s", error.what)
         return Furniture()
     own = frame.points[frame.valid & (frame.segmap != BACKGROUND)]
-    if plane is None or not _same(plane, table, own, config):
+    if plane is None or not len(own):
+        return Furniture()
+    above = float(np.median(table.plane.signed_distance(own) - plane.signed_distance(own)))
+    tops = [each.height for each in table.platforms]
+    levels = [*tops, 0.0, *(each.floor for each in table.bins)]
+    off = np.abs(above - np.array(levels))
+    if off.min() >= config.table.support.low:
         return Furniture()
     valid = np.isfinite(points[..., 2])
     masked = frame.segmap[valid] != BACKGROUND
     seen = np.asarray(points[valid], dtype=np.float64)
-    return Furniture(bins_of(table, seen, masked, config.bins), _walls(table, seen, masked, config))
+    platforms = _platforms(table, seen, masked, config)
+    lower = platforms[off.argmin()] is not None if off.argmin() < len(tops) else False
+    return Furniture(
+        bins_of(table, seen, masked, config.bins),
+        _walls(table, seen, masked, config),
+        [each for each in platforms if each is not None],
+        above if lower else 0.0,
+    )
 
 
 def segmentation_of(table: dict[str, Any] | None) -> SegmentConfig:
@@ -90,14 +115,22 @@ def segmentation_of(table: dict[str, Any] | None) -> SegmentConfig:
         return SegmentConfig()
 
 
-def _same(plane: Plane, table: Table, own: NDArray[np.floating], config: SegmentConfig) -> bool:
-    """Whether a plane is the table's, or a floor of a bin on it, where points (n, 3) of the
-    objects, metres, camera frame, lie."""
-    if not len(own):
-        return False
-    above = float(np.median(table.plane.signed_distance(own) - plane.signed_distance(own)))
-    floors = [0.0, *(each.floor for each in table.bins)]
-    return min(abs(above - floor) for floor in floors) < config.table.support.low
+def _platforms(
+    table: Table, points: Array, masked: NDArray[np.bool_], config: SegmentConfig
+) -> list[Solid | None]:
+    """Each platform, from its upper face down to the table; None for one that has a mask, and is an
+    object."""
+    plan, height = table.plan(points), table.plane.signed_distance(points)
+    found: list[Solid | None] = []
+    for each in table.platforms:
+        there = np.abs(height - each.height) < config.platforms.band
+        there[there] = in_hull(each.outside, plan[there], 0.0)
+        # Cells that hold its edge reach beyond it, by half of one on average.
+        out = config.platforms.around - config.bins.cell / 2
+        hull = each.outside + np.array([0.0, 0.0, out])
+        own = not there.any() or masked[there].mean() < config.bins.masked
+        found.append(_prism(table, hull, (each.height, 0.0), config) if own else None)
+    return found
 
 
 def _walls(
@@ -110,17 +143,17 @@ def _walls(
         faces.append(table.board.patch)
     near = [np.abs(face.plane.signed_distance(points)) < wall.near for face in faces]
     return [
-        _slab(face, wall.thick, config)
+        _prism(face, face.hull, (0.0, -wall.thick), config)
         for face, there in zip(faces, near, strict=True)
         if not there.any() or masked[there].mean() < config.bins.masked
     ]
 
 
-def _slab(face: Patch, thick: float, config: SegmentConfig) -> Solid:
-    outline = plain(corners_of(face.hull), config.bins.corners, config.bins.cell)
+def _prism(
+    part: Outlined, hull: Array, levels: tuple[float, float], config: SegmentConfig
+) -> Solid:
+    """What lies between two levels, metres above a plane, within an outline (m, 3) on it."""
+    outline = plain(corners_of(hull), config.bins.corners, config.bins.cell)
     return np.concatenate(
-        [
-            outline @ face.axes + (level - face.plane.offset) * face.plane.normal
-            for level in (0.0, -thick)
-        ]
+        [outline @ part.axes + (level - part.plane.offset) * part.plane.normal for level in levels]
     )

@@ -25,13 +25,21 @@ def corners_of(hull: Array) -> Array:
 def plain(outline: Array, share: float, tolerance: float) -> Array:
     """The smallest rectangle around an outline that fills `share` of it, or else the outline
     without corners that matter by less than `tolerance`."""
+    box = rectangle(outline, share)
+    if box is not None:
+        return box
+    closed = np.concatenate([outline, outline[:1]])
+    approximate = import_library("skimage.measure").approximate_polygon
+    return np.asarray(approximate(closed, tolerance)[:-1], dtype=np.float64)
+
+
+def rectangle(outline: Array, share: float) -> Array | None:
+    """The smallest rectangle (4, 2) around an outline, if it fills `share` of it."""
     from trimesh.bounds import oriented_bounds_2D
 
     T_box_plan, size = oriented_bounds_2D(outline)
     if import_library("scipy.spatial").ConvexHull(outline).volume < share * np.prod(size):
-        closed = np.concatenate([outline, outline[:1]])
-        approximate = import_library("skimage.measure").approximate_polygon
-        return np.asarray(approximate(closed, tolerance)[:-1], dtype=np.float64)
+        return None
     box = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) * size / 2
     return np.asarray((box - T_box_plan[:2, 2]) @ T_box_plan[:2, :2], dtype=np.float64)
 

@@ -1,4 +1,4 @@
-"""The table that a frame shows, with the bins on it."""
+"""The table that a frame shows, with the bins and platforms on it."""
 
 from __future__ import annotations
 
@@ -9,10 +9,13 @@ from numpy.typing import NDArray
 
 from brrp_cli.config.observation import WallConfig
 from brrp_cli.config.segmentation import SegmentConfig
-from brrp_cli.hulls import beyond_hull
+from brrp_cli.hulls import beyond_hull, in_hull
+from brrp_cli.observation.support_plane import Plane, nearest_plane
 from brrp_cli.observation.walls import Wall
 from brrp_cli.segmentation.beyond_image import beyond_image
 from brrp_cli.segmentation.bins import find_bins
+from brrp_cli.segmentation.plan_cells import plan_cells
+from brrp_cli.segmentation.platforms import find_platforms, on_platforms
 from brrp_cli.segmentation.standing_beside import Seen, with_things_beside
 from brrp_cli.segmentation.table_plane import Table, find_table
 
@@ -21,7 +24,8 @@ from brrp_cli.segmentation.table_plane import Table, find_table
 class SeenTable:
     """A table, and where points lie over it; NaN where there is no depth.
 
-    plan : (H, W, 2) metres, on it; height : (H, W) metres above it or a floor of a bin; beside :
+    plan : (H, W, 2) metres, on it; height : (H, W) metres above what lies beneath: it, a bin's
+    floor or a platform; beside :
     (H, W) metres beside it and beside what of it lies beyond the image, 0 or less on it, infinite
     on what shuts it off
     """
@@ -62,7 +66,8 @@ def see_table(
         table = replace(table, hull=hull)
         beside = np.minimum(beside, table.beside(plan))
     near = (beside <= config.bins.beside) & ~off
-    table = replace(table, bins=find_bins(plan[near], height[near], config.bins))
+    table = _with_what_is_on_it(table, points[near], plan[near], config)
+    height = table.plane.signed_distance(points) if table.platforms else height
     beyond = beyond_image(plan, flat, config.table)
     if beyond is not None:
         outside = beside > 0
@@ -72,6 +77,32 @@ def see_table(
             off |= wall.holds(points, walls.near)
     beside[off] = np.inf
     return SeenTable(table, plan, table.above_floors(plan, height), beside)
+
+
+def _with_what_is_on_it(
+    table: Table,
+    points: NDArray[np.floating],
+    plan: NDArray[np.float64],
+    config: SegmentConfig,
+) -> Table:
+    """The table with bins and platforms that points (n, 3) on and above it show; plan : (n, 2)."""
+    cells = plan_cells(plan, table.plane.signed_distance(points), config.bins)
+    if cells is None:
+        return table
+    platforms = find_platforms(cells, config.platforms)
+    if platforms:
+        # The table's plane is that of thin ones as well, until they are known.
+        flat = np.abs(table.plane.signed_distance(points)) < config.table.tolerance
+        for each in platforms:
+            flat &= ~in_hull(each.outside, plan, 0.0)
+        if flat.sum() >= config.table.min_points:
+            own = Plane.facing_the_camera(nearest_plane(points[flat].astype(np.float64)))
+            table = replace(table, plane=own)
+            again = plan_cells(plan, own.signed_distance(points), config.bins)
+            cells = cells if again is None else again
+            platforms = find_platforms(cells, config.platforms)
+    bins = find_bins(on_platforms(cells, platforms), config.bins)
+    return replace(table, bins=bins, platforms=platforms)
 
 
 def _fills_border(

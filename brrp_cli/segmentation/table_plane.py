@@ -18,17 +18,19 @@ from brrp_cli.observation.support_plane import Plane
 from brrp_cli.observation.walls import Board, Wall, board_over, walls_of
 from brrp_cli.seeds import child_rng
 from brrp_cli.segmentation.bins import Bin
+from brrp_cli.segmentation.platforms import Platform
 
 
 @dataclass(frozen=True)
 class Table(Outlined):
     """A support plane with its extent.
 
-    bins : on the table; they count as part of it
+    bins, platforms : on the table; they count as part of it
     walls : at which it ends; board : over it
     """
 
     bins: tuple[Bin, ...] = ()
+    platforms: tuple[Platform, ...] = ()
     walls: tuple[Wall, ...] = ()
     board: Board | None = None
 
@@ -38,18 +40,29 @@ class Table(Outlined):
         return bool(self.bins) or self.board is not None or any(w.spans for w in self.walls)
 
     def height(self, points: NDArray[np.floating]) -> NDArray[np.float64]:
-        """(...,) metres above the table, or above the floor of a bin, of points (..., 3)."""
+        """(...,) metres above what lies beneath points (..., 3): the table, the floor of a bin, or
+        a platform."""
         height = self.plane.signed_distance(points)
-        return self.above_floors(self.plan(points), height) if self.bins else height
+        return self.above_floors(self.plan(points), height) if self.on_it else height
+
+    @property
+    def on_it(self) -> bool:
+        """Whether a bin or a platform is on it."""
+        return bool(self.bins or self.platforms)
 
     def above_floors(
         self, plan: NDArray[np.floating], height: NDArray[np.float64]
     ) -> NDArray[np.float64]:
-        """(...,) metres above the table, or above the floor of a bin, of plan points (..., 2) at
-        `height` (...,) above the table's plane."""
+        """(...,) metres above the table, the floor of a bin or a platform, of plan points (..., 2)
+        at `height` (...,) above the table's plane."""
         above, flat = height.copy(), plan.reshape(-1, 2)
+        found = above.reshape(-1)
         for each in self.bins:
-            above.reshape(-1)[in_hull(each.outside, flat, 0.0)] -= each.floor
+            found[in_hull(each.outside, flat, 0.0)] -= each.floor
+        for platform in self.platforms:
+            near = np.flatnonzero(in_hull(platform.outside, flat, 0.0))
+            # What lies between the table and its upper face is its edge.
+            found[near] -= np.clip(found[near], 0.0, platform.height)
         return above
 
     def bin_walls(

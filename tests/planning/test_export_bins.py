@@ -100,8 +100,8 @@ def test_hands_keep_out_of_walls_that_nothing_shows(folder):
     scene = replace(scene, loose=np.zeros((0, 3)), hidden=NOTHING_HIDDEN)
     among, without = (
         plan_grasps(each, per_object=20, min_score=0.0)
-        for each in (scene, replace(scene, walls=()))
+        for each in (scene, replace(scene, solids=()))
     )
-    assert len(scene.walls) == 4
+    assert len(scene.solids) == 4
     assert {item.object_id for item in among.objects if item.grasps} >= {BOX}
     assert swept(among, bin_mesh()) == 0 < swept(without, bin_mesh())

@@ -75,18 +75,18 @@ def test_it_cannot_move_in_the_simulator_and_the_table_does_not_grow_with_it(fol
 
 def test_hands_keep_out_of_it(folder):
     scene = scene_of(open_result(folder.parent))
-    assert len(scene.walls) == 1
+    assert len(scene.solids) == 1
     blind = replace(scene, loose=np.zeros((0, 3)), hidden=NOTHING_HIDDEN)
     among, without = (
         plan_grasps(each, per_object=20, min_score=0.0)
-        for each in (blind, replace(blind, walls=()))
+        for each in (blind, replace(blind, solids=()))
     )
     assert swept(among, wall_mesh()) == 0 < swept(without, wall_mesh())
 
 
 def test_nor_do_they_go_behind_it(folder):
     """By what it hides alone."""
-    scene = replace(scene_of(open_result(folder.parent)), loose=np.zeros((0, 3)), walls=())
+    scene = replace(scene_of(open_result(folder.parent)), loose=np.zeros((0, 3)), solids=())
     seen, blind = (
         plan_grasps(each, per_object=20, min_score=0.0)
         for each in (scene, replace(scene, hidden=NOTHING_HIDDEN))

@@ -23,6 +23,8 @@ from brrp_cli.demo.layout import camera_pose, turn
 from brrp_cli.frames.frame import Frame
 from brrp_cli.geometry import similarity, transform_points
 from brrp_cli.segmentation.bins import find_bins
+from brrp_cli.segmentation.plan_cells import plan_cells
+from brrp_cli.segmentation.platforms import find_platforms
 from brrp_cli.segmentation.rectangles import rectangles
 from brrp_cli.segmentation.seen_surfaces import SeenSurfaces, see_surfaces
 from brrp_cli.segmentation.segment import segment
@@ -158,9 +160,12 @@ def test_an_empty_bin_is_a_thing():
 def test_on_a_table_of_any_size_nothing_breaks():
     rng = np.random.default_rng(0)
     plan = rng.uniform(-1e6, 1e6, (1000, 2))
-    assert find_bins(plan, rng.uniform(0, 0.4, 1000), CONFIG.bins) == ()
-    assert find_bins(plan[:0], np.zeros(0), CONFIG.bins) == ()
-    assert find_bins(np.zeros((5, 2)), np.full(5, 0.1), CONFIG.bins) == ()
+    height = rng.uniform(0, 0.4, 1000)
+    assert plan_cells(plan, height, CONFIG.bins) is None
+    assert plan_cells(plan[:0], height[:0], CONFIG.bins) is None
+    cells = plan_cells(np.zeros((5, 2)), np.full(5, 0.1), CONFIG.bins)
+    assert find_bins(cells, CONFIG.bins) == ()
+    assert find_platforms(cells, CONFIG.platforms) == ()
 
 
 @pytest.mark.parametrize("turn_by", [0.0, 0.4, 1.2])

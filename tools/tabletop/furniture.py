@@ -18,7 +18,7 @@ FILE = "furniture.json"
 
 
 class Furniture(Protocol):
-    """A bin, a wall or a shelf."""
+    """A platform, a bin, a wall or a shelf."""
 
     @property
     def color(self) -> tuple[float, float, float]:
@@ -53,19 +53,20 @@ def write_furniture(furniture: Furniture, folder: Path) -> None:
 
 
 def read_walls(folder: Path) -> tuple[str, list[trimesh.Trimesh]]:
-    """The kind of a scene's furniture, and all of it but its floor: boxes, metres, world. Errors:
-    SceneError for a scene without."""
+    """The kind of a scene's furniture, and all of it but a floor within walls: boxes, metres,
+    world. Errors: SceneError for a scene without."""
     path = folder / FILE
     if not path.is_file():
         raise SceneError(
-            "The scene has no bin and no shelf",
+            "The scene has no bin, no platform and no shelf",
             where=path,
-            expected="a scene that tools/make_scenes.py made with --bin or --shelf",
+            expected="a scene that tools/make_scenes.py made with --bin, --platform or --shelf",
             fix="make it anew, with the same options, one of these and --overwrite",
         )
     record = json.loads(path.read_text())
     meshes = []
-    for wall in record["panels"][1:]:
+    panels = record["panels"]
+    for wall in panels[1:] or panels:
         T = np.eye(4)
         T[:3, :3], T[:3, 3] = rotation(np.array(wall["orientation"])), wall["position"]
         meshes.append(trimesh.creation.box(2 * np.array(wall["half"]), T))

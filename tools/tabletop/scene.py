@@ -27,6 +27,7 @@ from tabletop.check import (
 from tabletop.furniture import Furniture, write_furniture
 from tabletop.light import draw_light, relight
 from tabletop.models import Model, load_model
+from tabletop.platform import Platform, draw_platform
 from tabletop.render import NOTHING, Picture, draw_look, render
 from tabletop.settle import Pose, drop
 from tabletop.shelf import Shelf, draw_shelf
@@ -47,9 +48,10 @@ DARK_TABLE = 0.15  # how bright it is, of a usual one
 class Plan:
     """What all scenes of a set share. `noise`: a key of `LIMITS`; `light`: one of `LIGHTS`;
     `size`: (width, height); `sensor`: one of `SENSOR_NAMES`, instead of noise; `stacked`: every
-    second object is dropped onto the one before it; `binned`: objects lie in a bin; `walled`: a
-    wall stands behind them, as the first camera sees them; `shelved`: they stand in a shelf;
-    `dark_table`: it is black and shiny; `standpoint`: where cameras stand."""
+    second object is dropped onto the one before it; `on_platform`: objects lie on a platform;
+    `binned`: in a bin; `walled`: a wall stands behind them, as the first camera sees them;
+    `shelved`: they stand in a shelf; `dark_table`: it is black and shiny; `standpoint`: where
+    cameras stand."""
 
     meshes: tuple[Path, ...]
     data_root: Path
@@ -62,6 +64,7 @@ class Plan:
     light: str = "plain"
     sensor: str = "none"
     stacked: bool = False
+    on_platform: bool = False
     binned: bool = False
     walled: bool = False
     shelved: bool = False
@@ -86,9 +89,11 @@ def make_scene(plan: Plan, number: int, check: bool) -> list[Distance]:
     """
     # Numbers of its own, so that other scenes stay as they are.
     bin = draw_bin(child_rng(plan.seed, "scene", number, "bin")) if plan.binned else None
+    platform_rng = child_rng(plan.seed, "scene", number, "platform")
+    platform = draw_platform(platform_rng) if plan.on_platform else None
     shelf = draw_shelf(child_rng(plan.seed, "scene", number, "shelf")) if plan.shelved else None
     paths, models, poses = draw_objects(
-        plan.meshes, plan.seed, number, stacked=plan.stacked, holder=bin or shelf
+        plan.meshes, plan.seed, number, stacked=plan.stacked, holder=platform or bin or shelf
     )
     rng = child_rng(plan.seed, "scene", number, "views")
     look = draw_look(len(models), rng)
@@ -103,7 +108,7 @@ def make_scene(plan: Plan, number: int, check: bool) -> list[Distance]:
     hulls = [
         pose.apply(model.hull + model.center) for pose, model in zip(poses, models, strict=True)
     ]
-    furniture: Furniture | None = bin
+    furniture: Furniture | None = platform or bin
     if shelf is not None:
         furniture = shelf.over(np.concatenate(hulls))
     if plan.walled:
@@ -127,7 +132,7 @@ def make_scene(plan: Plan, number: int, check: bool) -> list[Distance]:
             for i, (path, pose) in enumerate(zip(paths, poses, strict=True))
         ]
         (partial / "objects.json").write_text(json.dumps(entries, indent=2) + "\n")
-        if isinstance(furniture, Bin | Shelf):
+        if isinstance(furniture, Platform | Bin | Shelf):
             write_furniture(furniture, partial)
         for i, (camera, picture) in enumerate(zip(cameras, pictures, strict=True)):
             depth = picture.depth
@@ -162,7 +167,7 @@ def draw_objects(
     number: int,
     *,
     stacked: bool = False,
-    holder: Bin | Shelf | None = None,
+    holder: Platform | Bin | Shelf | None = None,
 ) -> tuple[list[Path], list[Model], list[Pose]]:
     """Three to ten objects that lie still on the table; drawn again until there are three.
 

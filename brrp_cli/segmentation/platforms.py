@@ -1,0 +1,139 @@
+"""Low platforms on the table, on which things lie: cutting boards, mats, the plates of turntables.
+
+In cells of the table's plan, what is highest in each shows one as a level region with a convex
+outline, a little above the table that lies around it. What rises from it lies on it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brrp_cli.config.table import PlatformsConfig
+from brrp_cli.dependencies import import_library
+from brrp_cli.hulls import convex_hull
+from brrp_cli.segmentation.outlines import corners_of, rectangle
+from brrp_cli.segmentation.plan_cells import AROUND, Cells, PlanCells
+
+
+@dataclass(frozen=True)
+class Platform:
+    """A platform on the table.
+
+    outside : hull (m, 3) a cell's width around it, as `Table.hull`, in its plan; height : metres of
+    its upper face above the table's plane
+    """
+
+    outside: NDArray[np.float64]
+    height: float
+
+
+def find_platforms(cells: PlanCells, config: PlatformsConfig) -> tuple[Platform, ...]:
+    """The platforms that cells show, the largest first."""
+    found: list[Platform] = []
+    taken = np.zeros_like(cells.tops, bool)
+    for region, platform in sorted(_all(cells, config), key=lambda pair: -int(pair[0].sum())):
+        if not (region & taken).any():
+            taken |= region
+            found.append(platform)
+    return tuple(found)
+
+
+def on_platforms(cells: PlanCells, platforms: Sequence[Platform]) -> PlanCells:
+    """The cells, of which those on platforms tell how high what is highest lies above these."""
+    tops = cells.tops.copy()
+    for each in platforms:
+        tops[cells.filled(each.outside, 0.0)] -= each.height
+    return replace(cells, tops=tops)
+
+
+def _all(cells: PlanCells, config: PlatformsConfig) -> Iterator[tuple[Cells, Platform]]:
+    """What may be platforms, at all heights, with their cells."""
+    for height in np.arange(config.least_height, config.most_height, config.step):
+        pieces = _level_pieces(cells, height, config)
+        while pieces:
+            level, *pieces = pieces
+            found, apart = _region(cells, level, config), []
+            # Things that lie across it part it.
+            for piece in pieces:
+                joined = _region(cells, level | piece, config)
+                if found is None or joined is None:
+                    apart.append(piece)
+                else:
+                    level, found = level | piece, joined
+            pieces = apart
+            top = float(np.median(cells.tops[level]))
+            if found is not None and _is_one(cells, found[1], top, config):
+                yield found[1], Platform(found[0] - np.array([0.0, 0.0, config.around]), top)
+
+
+def _level_pieces(cells: PlanCells, height: float, config: PlatformsConfig) -> list[Cells]:
+    """Cells of about one height, by the pieces that hang together, the largest first."""
+    ndimage = import_library("scipy.ndimage")
+    # Of a thin platform, the table is no farther off than what is uneven.
+    least, most = height - min(config.band, height / 2), height + config.band
+    band = (cells.tops >= least) & (cells.tops <= most)
+    if band.sum() * cells.cell**2 < config.shown * config.area:
+        return []
+    # Without what is a cell or two wide, as bled edges are.
+    band = ndimage.binary_opening(band, AROUND)
+    labels, count = ndimage.label(ndimage.binary_dilation(band, AROUND, config.gap), AROUND)
+    pieces = [band & (labels == label) for label in range(1, count + 1)]
+    return sorted(pieces, key=lambda piece: -int(piece.sum()))
+
+
+def _region(
+    cells: PlanCells, level: Cells, config: PlatformsConfig
+) -> tuple[NDArray[np.float64], Cells] | None:
+    """The outline (m, 3) of a region of which cells `level` are most of what is seen but for things
+    that lie on it, and its cells."""
+    ndimage = import_library("scipy.ndimage")
+    top = float(np.median(cells.tops[level]))
+    lower = np.isfinite(cells.tops) & (cells.tops < top - min(config.band, top / 2))
+    for hull in _outlines(cells, level, config):
+        region = cells.filled(hull, cells.cell / 2)
+        below = ndimage.binary_erosion(region, AROUND) & lower
+        if (
+            level.sum() >= config.shown * region.sum()
+            and below.sum() <= config.below * region.sum()
+        ):
+            return hull, region
+    return None
+
+
+def _outlines(
+    cells: PlanCells, level: Cells, config: PlatformsConfig
+) -> Iterator[NDArray[np.float64]]:
+    """Hulls (m, 3): of the rectangle around level cells, whose corners things may hide, and of the
+    cells alone."""
+    hull = cells.hull(level)
+    if hull is None:
+        return
+    corners = rectangle(corners_of(hull), config.rectangle)
+    around = None if corners is None else convex_hull(corners)
+    if around is not None:
+        yield around
+    yield hull
+
+
+def _is_one(cells: PlanCells, region: Cells, top: float, config: PlatformsConfig) -> bool:
+    """Whether a level region, `top` metres high, is large, something lies on it, and the table lies
+    around it; a tray has walls there."""
+    ndimage = import_library("scipy.ndimage")
+    high, seen = cells.tops > top + config.lies, np.isfinite(cells.tops)
+    inside = ndimage.binary_erosion(region, AROUND, 2)
+    near, beyond = (ndimage.binary_dilation(region, AROUND, out) for out in (1, 3))
+    edge = ndimage.binary_dilation(near, AROUND) & ~inside
+    ring = beyond & ~near
+    judged = ring & seen & ~high
+    return bool(
+        top >= config.least_height
+        and region.sum() * cells.cell**2 >= config.area
+        and (inside & high).sum() * cells.cell**2 >= config.filled
+        and (edge & high).sum() <= config.walled * (edge & seen).sum()
+        and judged.sum() >= config.ring * ring.sum()
+        and (judged & (cells.tops < top / 2)).sum() >= config.table * judged.sum()
+    )
