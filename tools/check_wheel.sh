@@ -40,7 +40,7 @@ from brrp_cli.segmentation.prompted.mask_files import MANIFEST as MASKS
 package = Path(brrp_cli.__file__).parent
 assert package.is_relative_to(sys.prefix), f"{package} is not the wheel's"
 view = [package / "view/assets/three.min.js", package / "view/assets/three.LICENSE"]
-for path in (YCB_MANIFEST, CLIP, MASKS, package / "completion/weights.npz", package / "completion/shapes.safetensors", package / "segmentation/affinities.onnx", package / "segmentation/affinities_bin.onnx", package / "methods/pointsdf/tabletop.safetensors", package / "py.typed", *view):
+for path in (YCB_MANIFEST, CLIP, MASKS, package / "completion/weights.npz", package / "completion/shapes.safetensors", package / "segmentation/affinities.onnx", package / "segmentation/affinities_walled.onnx", package / "methods/pointsdf/tabletop.safetensors", package / "py.typed", *view):
     assert path.is_file() and path.is_relative_to(package), f"the wheel lacks {path}"
 PYTHON
 venv/bin/brrp --version

@@ -10,8 +10,8 @@ start or, with `--begin`, from the weights of an earlier training. The same comm
 it was stopped or killed; more --epochs lengthen a training that is over.
 
 Some scenes are kept to validate. OUTPUT/affinities.onnx has the weights of the epoch with
-the least loss on them; in brrp_cli/segmentation/, as affinities.onnx or affinities_bin.onnx, it is
-what the package parts objects with. history.json has the losses of each epoch.
+the least loss on them; in brrp_cli/segmentation/, as affinities.onnx or affinities_walled.onnx,
+it is what the package parts objects with. history.json has the losses of each epoch.
 """
 
 from __future__ import annotations

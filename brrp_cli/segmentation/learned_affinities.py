@@ -36,8 +36,8 @@ T = TypeVar("T", bound=np.generic)
 # In the file's metadata, beside `network` and `training`, which are JSON.
 FORMAT = "brrp affinities 3"
 WHAT = "the network that parts objects"
-# Of tables, and of what lies in a bin, whose walls the former never saw.
-NAME, BIN_NAME = "affinities.onnx", "affinities_bin.onnx"
+# Of tables, and of what lies in a bin, in a shelf or before a wall, which the former never saw.
+NAME, WALLED_NAME = "affinities.onnx", "affinities_walled.onnx"
 CHANNELS_IN, PROBABILITIES_OUT = "channels", "probabilities"
 
 
@@ -86,10 +86,10 @@ class Affinities:
 @kept_for_last_image
 def affinities_in(frame: Frame, seen: SeenSurfaces, config: SegmentConfig) -> Affinities:
     """What the network that comes with the package says of a frame and the surfaces seen in it, of
-    what rises and what is near it. Where there is a bin, it is the network that knows bins."""
+    what rises and what is near it. Where there are walls, it is the network that knows them."""
     risen = rising_in(frame, seen, config).risen
     own = config.affinities
-    network = shipped(BIN_NAME if seen.table.bins else NAME)
+    network = shipped(WALLED_NAME if seen.table.walled else NAME)
     return affinities_of(frame.rgb, seen, network, own.colour, risen, own.margin)
 
 
@@ -126,6 +126,6 @@ def affinities_of(
 
 @cache
 def shipped(name: str = NAME) -> AffinityModel:
-    """A network that comes with the package, `NAME` or `BIN_NAME`."""
+    """A network that comes with the package, `NAME` or `WALLED_NAME`."""
     with as_file(files("brrp_cli.segmentation") / name) as path:
         return AffinityModel(path)

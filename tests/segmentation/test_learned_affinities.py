@@ -1,12 +1,12 @@
 """The network that parts objects: its file, and what it says of images of any size."""
 
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import replace
 
 import bin_scene
 import numpy as np
 import onnx
 import pytest
+import room_scene
 import torch
 from training.affinity_file import load_weights, save_affinity_network
 from training.affinity_network import AffinityNetwork, AffinityNetworkConfig
@@ -14,11 +14,10 @@ from training.affinity_network import AffinityNetwork, AffinityNetworkConfig
 from brrp_cli.config.segmentation import SegmentConfig
 from brrp_cli.errors import WeightsError
 from brrp_cli.frames.build import make_frame
-from brrp_cli.segmentation.bins import Bin
 from brrp_cli.segmentation.image_channels import CHANNELS
 from brrp_cli.segmentation.learned_affinities import (
-    BIN_NAME,
     NAME,
+    WALLED_NAME,
     Affinities,
     AffinityModel,
     affinities_in,
@@ -157,27 +156,41 @@ def test_torchs_threads_change_no_byte(scene):
     assert found[0] == found[1]
 
 
-def test_the_network_that_knows_bins_is_asked_where_there_is_one(scene):
-    frame = make_frame(rgb=scene.rgb, depth=scene.depth, K=scene.K)
+BIN_FRAME = bin_scene.seen(bin_scene.standing((0.08, 0.06, 0.07), 0.05, 0.02))
+SHELF_FRAME = room_scene.photograph(
+    room_scene.THINGS, room_scene.shelf(), elevation=0.25, distance=0.9
+)
+
+
+@pytest.mark.parametrize(
+    ("frame", "name"),
+    [
+        (room_scene.photograph(room_scene.THINGS, [room_scene.TABLE]), NAME),
+        (
+            room_scene.photograph(room_scene.THINGS, [room_scene.TABLE, room_scene.wall()]),
+            WALLED_NAME,
+        ),
+        (SHELF_FRAME, WALLED_NAME),
+        (BIN_FRAME, WALLED_NAME),
+    ],
+    ids=["table", "wall", "shelf", "bin"],
+)
+def test_the_network_that_knows_walls_is_asked_where_there_are_some(frame, name):
     config = SegmentConfig()
-    table = see_surfaces(frame, 0, config)
-    outside = np.array([[1.0, 0.0, 9.0]])  # half planes far from all that is seen
-    found = Bin(outside, outside, 0.02, 0.0, 0.1)
-    inside = replace(table, table=replace(table.table, bins=(found,)))
+    seen = see_surfaces(frame, 0, config)
     own = config.affinities
-    for seen, name in ((table, NAME), (inside, BIN_NAME)):
-        risen = rising_in(frame, seen, config).risen
-        said = affinities_of(frame.rgb, seen, shipped(name), own.colour, risen, own.margin)
-        assert np.array_equal(affinities_in(frame, seen, config).same, said.same)
-        assert said.same.any()
+    risen = rising_in(frame, seen, config).risen
+    said = affinities_of(frame.rgb, seen, shipped(name), own.colour, risen, own.margin)
+    assert np.array_equal(affinities_in(frame, seen, config).same, said.same)
+    assert said.same.any()
 
 
-def test_the_network_that_knows_bins_takes_their_walls_for_none_of_the_objects():
-    frame = bin_scene.seen(bin_scene.standing((0.08, 0.06, 0.07), 0.05, 0.02))
+@pytest.mark.parametrize(("frame", "least"), [(BIN_FRAME, 0.03), (SHELF_FRAME, 0.05)])
+def test_the_network_that_knows_walls_takes_them_for_none_of_the_objects(frame, least):
     seen = see_surfaces(frame, 0, SegmentConfig())
-    said = affinities_of(frame.rgb, seen, shipped(BIN_NAME), 0.5)
+    said = affinities_of(frame.rgb, seen, shipped(WALLED_NAME), 0.5)
     thing = said.sample(frame.segmap) == 1
-    walls = said.sample(frame.segmap == 0) & (said.sample(seen.height) > 0.03)
+    walls = said.sample(frame.segmap == 0) & (said.sample(seen.height) > least)
     assert walls.sum() > 1000
     assert np.median(said.object[thing]) > 0.8
     assert np.median(said.object[walls]) < 0.2
