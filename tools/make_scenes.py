@@ -163,8 +163,10 @@ def main(
             )
         if sum((stacked, on_platform, binned, shelved)) > 1:
             raise click.UsageError("--stack, --platform, --bin and --shelf exclude one another")
-        if walled and (binned or shelved or views > 1):
-            raise click.UsageError("--wall takes --views 1, whose back it is, no --bin or --shelf")
+        if walled and (on_platform or binned or shelved or views > 1):
+            raise click.UsageError(
+                "--wall takes --views 1, whose back it is, no --platform, --bin or --shelf"
+            )
         if data_root is None:
             if meshes is None:
                 raise click.UsageError("name the meshes: --meshes, or --data-root with --check")

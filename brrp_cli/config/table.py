@@ -147,7 +147,8 @@ class PlatformsConfig:
     lies : what rises more over it lies on it; filled : metres squared of that, or the platform is
     empty, and a thing itself; walled : part of its edge that rises so, from which on it is a tray
     ring : part of what lies around it that is seen, at least; table : part of that which is table
-    around : metres beside it that may be its edge
+    around : metres beside it that may be its edge; rounds : times that the table's plane is fitted
+    to what lies beside it
     """
 
     least_height: float = 0.004
@@ -165,3 +166,4 @@ class PlatformsConfig:
     ring: float = share(0.3)
     table: float = share(0.6)
     around: float = 0.01
+    rounds: int = between(3, 0, 10)

@@ -16,7 +16,8 @@ Floats = NDArray[np.floating]
 @dataclass(frozen=True)
 class Outlined:
     """plane : the camera's side is positive
-    axes : (2, 3) float64, unit, spanning it: plan coordinates are points @ axes.T
+    axes : (2, 3) float64, unit, that span it, or one that leans against it by little: plan
+        coordinates are points @ axes.T
     hull : (m, 3) float64: plan points p with hull[:, :2] @ p + hull[:, 2] <= 0 lie within it
     """
 
@@ -27,6 +28,13 @@ class Outlined:
     def plan(self, points: Floats) -> NDArray[np.float64]:
         """Plan coordinates (..., 2), metres, of points (..., 3), camera frame."""
         return np.asarray(points @ self.axes.T, dtype=np.float64)
+
+    def at(self, plan: Floats, level: float) -> NDArray[np.float64]:
+        """(n, 3) the points, camera frame, `level` metres above the plane, that have plan
+        coordinates (n, 2)."""
+        sides = np.vstack([self.axes, self.plane.normal])
+        known = np.column_stack([plan, np.full(len(plan), level - self.plane.offset)])
+        return np.asarray(np.linalg.solve(sides, known.T).T, dtype=np.float64)
 
     def holds(self, plan: Floats, margin: float) -> NDArray[np.bool_]:
         """(n,) whether plan points (n, 2) lie within it or at most `margin` metres beside it."""

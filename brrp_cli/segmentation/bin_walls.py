@@ -52,10 +52,7 @@ def walls_of(
     outline = plain(corners_of(rim), config.corners, config.cell)
     foot = _lean(outline, each, config) * each.rim
     faces = ((half, each.rim), (-half, each.rim), (half - foot, 0.0), (-half - foot, 0.0))
-    rings = [
-        shifted(outline, out) @ table.axes + (level - table.plane.offset) * table.plane.normal
-        for out, level in faces
-    ]
+    rings = [table.at(shifted(outline, out), level) for out, level in faces]
     rises = plan[height > each.rim - config.band]
     return [
         np.concatenate([ring[[side, (side + 1) % len(outline)]] for ring in rings])

@@ -154,6 +154,4 @@ def _prism(
 ) -> Solid:
     """What lies between two levels, metres above a plane, within an outline (m, 3) on it."""
     outline = plain(corners_of(hull), config.bins.corners, config.bins.cell)
-    return np.concatenate(
-        [outline @ part.axes + (level - part.plane.offset) * part.plane.normal for level in levels]
-    )
+    return np.concatenate([part.at(outline, level) for level in levels])

@@ -90,17 +90,19 @@ def _with_what_is_on_it(
     if cells is None:
         return table
     platforms = find_platforms(cells, config.platforms)
-    if platforms:
-        # The table's plane is that of thin ones as well, until they are known.
+    # The table's plane is that of thin ones as well, until they are known.
+    for _ in range(config.platforms.rounds if platforms else 0):
         flat = np.abs(table.plane.signed_distance(points)) < config.table.tolerance
         for each in platforms:
             flat &= ~in_hull(each.outside, plan, 0.0)
-        if flat.sum() >= config.table.min_points:
-            own = Plane.facing_the_camera(nearest_plane(points[flat].astype(np.float64)))
-            table = replace(table, plane=own)
-            again = plan_cells(plan, own.signed_distance(points), config.bins)
-            cells = cells if again is None else again
-            platforms = find_platforms(cells, config.platforms)
+        if flat.sum() < config.table.min_points:
+            break
+        plane = Plane.facing_the_camera(nearest_plane(points[flat].astype(np.float64)))
+        again = plan_cells(plan, plane.signed_distance(points), config.bins)
+        found = () if again is None else find_platforms(again, config.platforms)
+        if again is None or not found:
+            break
+        table, cells, platforms = replace(table, plane=plane), again, found
     bins = find_bins(on_platforms(cells, platforms), config.bins)
     return replace(table, bins=bins, platforms=platforms)
 

@@ -188,9 +188,12 @@ def test_the_network_that_knows_walls_is_asked_where_there_are_some(frame, name)
 @pytest.mark.parametrize(("frame", "least"), [(BIN_FRAME, 0.03), (SHELF_FRAME, 0.05)])
 def test_the_network_that_knows_walls_takes_them_for_none_of_the_objects(frame, least):
     seen = see_surfaces(frame, 0, SegmentConfig())
-    said = affinities_of(frame.rgb, seen, shipped(WALLED_NAME), 0.5)
+    other, said = (
+        affinities_of(frame.rgb, seen, shipped(name), 0.5) for name in (NAME, WALLED_NAME)
+    )
     thing = said.sample(frame.segmap) == 1
     walls = said.sample(frame.segmap == 0) & (said.sample(seen.height) > least)
     assert walls.sum() > 1000
     assert np.median(said.object[thing]) > 0.8
-    assert np.median(said.object[walls]) < 0.2
+    # To the one that knows tables alone they are objects.
+    assert np.median(said.object[walls]) < 0.25 < 0.75 < np.median(other.object[walls])

@@ -17,6 +17,7 @@ from make_scenes import main as make_scenes
 from measure_furniture import Found, bin_points, count_grasps, face_points, in_view, line, main
 from tabletop.bin import draw_bin
 from tabletop.furniture import FILE, read_walls, write_furniture
+from tabletop.platform import draw_platform
 from tabletop.shelf import draw_shelf
 
 from brrp_cli.config.grasping import GraspConfig
@@ -86,6 +87,12 @@ def test_walls_that_are_elsewhere_are_false(scenes, monkeypatch, capsys):
     assert int(false) == int(models) > 2 and "off nan" in out
 
 
+def test_a_platform_is_where_it_was_made(root, monkeypatch, capsys):
+    out = said(monkeypatch, capsys, made(root, "--elevation", 40, 60, "--platform"))
+    assert "platforms 2/2, walls 2/2" in out and "false 0/2" in out
+    assert float(out.partition("off ")[2].split()[0]) < 2.0
+
+
 def test_scenes_without_a_bin_are_told(tmp_path, scenes, monkeypatch):
     bare = shutil.copytree(scenes, tmp_path / "bare")
     for path in bare.glob(f"*/{FILE}"):
@@ -104,6 +111,10 @@ def test_walls_are_read_as_they_were_written(tmp_path):
     assert np.vstack([wall.vertices for wall in walls])[:, 2].max() == pytest.approx(
         made.height, abs=made.thickness
     )
+    platform = draw_platform(np.random.default_rng(0))
+    write_furniture(platform, tmp_path)
+    kind, (solid,) = read_walls(tmp_path)
+    assert kind == "platform" and solid.extents[2] == pytest.approx(platform.thickness)
     shelf = draw_shelf(np.random.default_rng(0)).over(np.array([[0.0, 0.0, 0.3]]))
     write_furniture(shelf, tmp_path)
     kind, walls = read_walls(tmp_path)

@@ -1,4 +1,4 @@
-"""Scenes in a bin, in a shelf, before a wall, and on one another."""
+"""Scenes in a bin, on a platform, in a shelf, before a wall, and on one another."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ pytest.importorskip("pybullet")
 from made_scenes import bytes_of, generate, write_box, write_two
 from tabletop.bin import draw_bin
 from tabletop.models import find_meshes, load_model
+from tabletop.platform import draw_platform
 from tabletop.settle import rotation
 from tabletop.shelf import BESIDE, draw_shelf
 from tabletop.stack import stack
@@ -55,6 +56,22 @@ def test_objects_lie_in_a_bin_that_is_background(data):
             on_wall |= (local < wall.half + 1e-3).all(axis=1)
         assert on_wall.sum() > 300
         assert (frame.segmap[frame.valid][on_wall & (points[:, 2] > 0.02)] == 0).mean() > 0.97
+
+
+def test_objects_lie_on_a_platform_that_is_background(data):
+    generate_twice(data, "on_platform", "--scenes", 2, "--views", 1, "--platform")
+    for number, scene in enumerate(find_scenes(data / "on_platform")):
+        platform = draw_platform(child_rng(0, "scene", number, "platform"))
+        (panel,) = platform.panels()
+        assert panel.position[2] - panel.half[2] == pytest.approx(0)
+        lowest = [true_mesh(o, data).bounds[0, 2] for o in scene.objects]
+        assert max(lowest) == pytest.approx(platform.thickness, abs=0.002)
+        frame = scene.view(0)
+        points = transform_points(frame.T_world_cam, frame.points[frame.valid].astype(np.float64))
+        local = np.abs((points - panel.position) @ rotation(panel.orientation))
+        on_it = (local < panel.half + 1e-3).all(axis=1) & (points[:, 2] > panel.half[2])
+        assert on_it.sum() > 300
+        assert (frame.segmap[frame.valid][on_it] == 0).mean() > 0.97
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -139,6 +156,8 @@ def test_a_wall_stands_behind_what_the_camera_sees_and_moves_nothing(data):
     [
         (("--bin", "--stack"), "exclude one another"),
         (("--bin", "--shelf"), "exclude one another"),
+        (("--platform", "--bin"), "exclude one another"),
+        (("--wall", "--platform"), "--wall takes --views 1"),
         (("--wall", "--shelf"), "--wall takes --views 1"),
         (("--wall", "--bin"), "--wall takes --views 1"),
         (("--wall", "--views", 2), "--wall takes --views 1"),
