@@ -142,8 +142,9 @@ class PlatformsConfig:
     least_height, most_height, step : of the heights above the table that are tried; band : what is
     that far above or below may be of the same one
     area : of one, metres squared: more than boxes and plates have; shown : part of it that is
-    level; below : part of it that is lower, at most; rectangle : part of the one around it that is
-    filled, from which on it is one; gap : cells by which what is level is joined
+    level; piece : part of it that hangs together, at least; below : part of it that is lower, at
+    most; rectangle : part of the one around it that is filled, from which on it is one; gap : cells
+    by which what is level is joined
     lies : what rises more over it lies on it; filled : metres squared of that, or the platform is
     empty, and a thing itself; walled : part of its edge that rises so, from which on it is a tray
     ring : part of what lies around it that is seen, at least; table : part of that which is table
@@ -153,10 +154,11 @@ class PlatformsConfig:
 
     least_height: float = 0.004
     most_height: float = 0.045
-    step: float = 0.002
+    step: float = 0.003
     band: float = 0.004
     area: float = 0.045
     shown: float = share(0.3)
+    piece: float = share(0.15)
     below: float = share(0.1)
     rectangle: float = share(0.8)
     gap: int = between(2, 1, 16)

@@ -15,7 +15,6 @@ from brrp_cli.config.tables import changed
 from brrp_cli.errors import ConfigError, FrameError
 from brrp_cli.frames.frame import BACKGROUND, Frame
 from brrp_cli.geometry import backproject, transform_points
-from brrp_cli.hulls import in_hull
 from brrp_cli.observation.outlined import Outlined
 from brrp_cli.observation.support_plane import Plane
 from brrp_cli.segmentation.bin_walls import Solid, bins_of
@@ -124,7 +123,7 @@ def _platforms(
     found: list[Solid | None] = []
     for each in table.platforms:
         there = np.abs(height - each.height) < config.platforms.band
-        there[there] = in_hull(each.outside, plan[there], 0.0)
+        there[there] = each.holds(plan[there])
         # Cells that hold its edge reach beyond it, by half of one on average.
         out = config.platforms.around - config.bins.cell / 2
         hull = each.outside + np.array([0.0, 0.0, out])

@@ -34,7 +34,8 @@ def plain(outline: Array, share: float, tolerance: float) -> Array:
 
 
 def rectangle(outline: Array, share: float) -> Array | None:
-    """The smallest rectangle (4, 2) around an outline, if it fills `share` of it."""
+    """The smallest rectangle (4, 2) around an outline, or what is within it, if its hull fills
+    `share` of that."""
     from trimesh.bounds import oriented_bounds_2D
 
     T_box_plan, size = oriented_bounds_2D(outline)

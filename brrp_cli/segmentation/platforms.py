@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from brrp_cli.config.table import PlatformsConfig
 from brrp_cli.dependencies import import_library
-from brrp_cli.hulls import convex_hull
-from brrp_cli.segmentation.outlines import corners_of, rectangle
+from brrp_cli.hulls import convex_hull, in_hull
+from brrp_cli.segmentation.outlines import rectangle
 from brrp_cli.segmentation.plan_cells import AROUND, Cells, PlanCells
 
 
@@ -29,6 +29,10 @@ class Platform:
 
     outside: NDArray[np.float64]
     height: float
+
+    def holds(self, plan: NDArray[np.floating]) -> NDArray[np.bool_]:
+        """(n,) whether plan points (n, 2) lie over it or its edge."""
+        return in_hull(self.outside, plan, 0.0)
 
 
 def find_platforms(cells: PlanCells, config: PlatformsConfig) -> tuple[Platform, ...]:
@@ -54,20 +58,25 @@ def _all(cells: PlanCells, config: PlatformsConfig) -> Iterator[tuple[Cells, Pla
     """What may be platforms, at all heights, with their cells."""
     for height in np.arange(config.least_height, config.most_height, config.step):
         pieces = _level_pieces(cells, height, config)
-        while pieces:
+        while pieces and pieces[0].sum() * cells.cell**2 >= config.piece * config.area:
             level, *pieces = pieces
-            found, apart = _region(cells, level, config), []
+            hull = _outline(cells, level, config)
+            if hull is None:
+                continue
+            apart = []
             # Things that lie across it part it.
             for piece in pieces:
-                joined = _region(cells, level | piece, config)
-                if found is None or joined is None:
+                joined = _outline(cells, level | piece, config)
+                if joined is None:
                     apart.append(piece)
                 else:
-                    level, found = level | piece, joined
+                    level, hull = level | piece, joined
             pieces = apart
+            hull = _with_hidden_corners(cells, level, hull, config)
+            region = cells.filled(hull, cells.cell / 2)
             top = float(np.median(cells.tops[level]))
-            if found is not None and _is_one(cells, found[1], top, config):
-                yield found[1], Platform(found[0] - np.array([0.0, 0.0, config.around]), top)
+            if _is_one(cells, region, top, config):
+                yield region, Platform(hull - np.array([0.0, 0.0, config.around]), top)
 
 
 def _level_pieces(cells: PlanCells, height: float, config: PlatformsConfig) -> list[Cells]:
@@ -85,38 +94,34 @@ def _level_pieces(cells: PlanCells, height: float, config: PlatformsConfig) -> l
     return sorted(pieces, key=lambda piece: -int(piece.sum()))
 
 
-def _region(
-    cells: PlanCells, level: Cells, config: PlatformsConfig
-) -> tuple[NDArray[np.float64], Cells] | None:
-    """The outline (m, 3) of a region of which cells `level` are most of what is seen but for things
-    that lie on it, and its cells."""
+def _outline(cells: PlanCells, level: Cells, config: PlatformsConfig) -> NDArray[np.float64] | None:
+    """The hull (m, 3) of cells `level`, if these are most of what is seen in it but for things that
+    lie there."""
+    hull = cells.hull(level)
+    return hull if hull is not None and _fits(cells, level, hull, config) else None
+
+
+def _fits(
+    cells: PlanCells, level: Cells, hull: NDArray[np.float64], config: PlatformsConfig
+) -> bool:
     ndimage = import_library("scipy.ndimage")
+    region = cells.filled(hull, cells.cell / 2)
+    if level.sum() < config.shown * region.sum():
+        return False
     top = float(np.median(cells.tops[level]))
     lower = np.isfinite(cells.tops) & (cells.tops < top - min(config.band, top / 2))
-    for hull in _outlines(cells, level, config):
-        region = cells.filled(hull, cells.cell / 2)
-        below = ndimage.binary_erosion(region, AROUND) & lower
-        if (
-            level.sum() >= config.shown * region.sum()
-            and below.sum() <= config.below * region.sum()
-        ):
-            return hull, region
-    return None
+    below = ndimage.binary_erosion(region, AROUND) & lower
+    return bool(below.sum() <= config.below * region.sum())
 
 
-def _outlines(
-    cells: PlanCells, level: Cells, config: PlatformsConfig
-) -> Iterator[NDArray[np.float64]]:
-    """Hulls (m, 3): of the rectangle around level cells, whose corners things may hide, and of the
-    cells alone."""
-    hull = cells.hull(level)
-    if hull is None:
-        return
-    corners = rectangle(corners_of(hull), config.rectangle)
+def _with_hidden_corners(
+    cells: PlanCells, level: Cells, hull: NDArray[np.float64], config: PlatformsConfig
+) -> NDArray[np.float64]:
+    """The hull (m, 3), or the rectangle around it, whose corners things may hide."""
+    corners = rectangle(cells.middles[level.ravel()], config.rectangle)
     around = None if corners is None else convex_hull(corners)
-    if around is not None:
-        yield around
-    yield hull
+    fits = around is not None and _fits(cells, level, around, config)
+    return around if around is not None and fits else hull
 
 
 def _is_one(cells: PlanCells, region: Cells, top: float, config: PlatformsConfig) -> bool:

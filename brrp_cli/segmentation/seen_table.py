@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from brrp_cli.config.observation import WallConfig
 from brrp_cli.config.segmentation import SegmentConfig
-from brrp_cli.hulls import beyond_hull, in_hull
+from brrp_cli.hulls import beyond_hull
 from brrp_cli.observation.support_plane import Plane, nearest_plane
 from brrp_cli.observation.walls import Wall
 from brrp_cli.segmentation.beyond_image import beyond_image
@@ -94,7 +94,7 @@ def _with_what_is_on_it(
     for _ in range(config.platforms.rounds if platforms else 0):
         flat = np.abs(table.plane.signed_distance(points)) < config.table.tolerance
         for each in platforms:
-            flat &= ~in_hull(each.outside, plan, 0.0)
+            flat &= ~each.holds(plan)
         if flat.sum() < config.table.min_points:
             break
         plane = Plane.facing_the_camera(nearest_plane(points[flat].astype(np.float64)))

@@ -60,7 +60,7 @@ class Table(Outlined):
         for each in self.bins:
             found[in_hull(each.outside, flat, 0.0)] -= each.floor
         for platform in self.platforms:
-            near = np.flatnonzero(in_hull(platform.outside, flat, 0.0))
+            near = np.flatnonzero(platform.holds(flat))
             # What lies between the table and its upper face is its edge.
             found[near] -= np.clip(found[near], 0.0, platform.height)
         return above
