@@ -143,7 +143,8 @@ class PlatformsConfig:
     that far above or below may be of the same one
     area : of one, metres squared: more than boxes and plates have; shown : part of it that is
     level; piece : part of it that hangs together, at least; below : part of it that is lower, at
-    most; rectangle : part of the one around it that is filled, from which on it is one; gap : cells
+    most; uneven : what is higher but does not lie on it, at most, as a part of what is level;
+    rectangle : part of the one around it that is filled, from which on it is one; gap : cells
     by which what is level is joined
     lies : what rises more over it lies on it; filled : metres squared of that, or the platform is
     empty, and a thing itself; walled : part of its edge that rises so, from which on it is a tray
@@ -160,6 +161,7 @@ class PlatformsConfig:
     shown: float = share(0.3)
     piece: float = share(0.15)
     below: float = share(0.1)
+    uneven: float = share(0.25)
     rectangle: float = share(0.8)
     gap: int = between(2, 1, 16)
     lies: float = 0.012

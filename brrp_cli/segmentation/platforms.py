@@ -111,7 +111,11 @@ def _fits(
     top = float(np.median(cells.tops[level]))
     lower = np.isfinite(cells.tops) & (cells.tops < top - min(config.band, top / 2))
     below = ndimage.binary_erosion(region, AROUND) & lower
-    return bool(below.sum() <= config.below * region.sum())
+    # Waves of a far table have as many cells a little above any level as they have on it.
+    above = region & (cells.tops > top + config.band) & (cells.tops < top + config.lies)
+    return bool(
+        below.sum() <= config.below * region.sum() and above.sum() <= config.uneven * level.sum()
+    )
 
 
 def _with_hidden_corners(
@@ -140,5 +144,5 @@ def _is_one(cells: PlanCells, region: Cells, top: float, config: PlatformsConfig
         and (inside & high).sum() * cells.cell**2 >= config.filled
         and (edge & high).sum() <= config.walled * (edge & seen).sum()
         and judged.sum() >= config.ring * ring.sum()
-        and (judged & (cells.tops < top / 2)).sum() >= config.table * judged.sum()
+        and (judged & (np.abs(cells.tops) < top / 2)).sum() >= config.table * judged.sum()
     )
