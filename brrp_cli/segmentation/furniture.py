@@ -86,18 +86,19 @@ def furniture(frame: Frame, plane: Plane | None, seed: int, config: SegmentConfi
     tops = [each.height for each in table.platforms]
     levels = [*tops, 0.0, *(each.floor for each in table.bins)]
     off = np.abs(above - np.array(levels))
-    if off.min() >= config.table.support.low:
+    nearest = int(off.argmin())
+    if off[nearest] >= config.table.support.low:
         return Furniture()
     valid = np.isfinite(points[..., 2])
     masked = frame.segmap[valid] != BACKGROUND
     seen = np.asarray(points[valid], dtype=np.float64)
     platforms = _platforms(table, seen, masked, config)
-    lower = platforms[off.argmin()] is not None if off.argmin() < len(tops) else False
+    on_platform = nearest < len(tops) and platforms[nearest] is not None
     return Furniture(
         bins_of(table, seen, masked, config.bins),
         _walls(table, seen, masked, config),
         [each for each in platforms if each is not None],
-        above if lower else 0.0,
+        above if on_platform else 0.0,
     )
 
 

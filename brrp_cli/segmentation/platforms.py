@@ -124,8 +124,7 @@ def _with_hidden_corners(
     """The hull (m, 3), or the rectangle around it, whose corners things may hide."""
     corners = rectangle(cells.middles[level.ravel()], config.rectangle)
     around = None if corners is None else convex_hull(corners)
-    fits = around is not None and _fits(cells, level, around, config)
-    return around if around is not None and fits else hull
+    return hull if around is None or not _fits(cells, level, around, config) else around
 
 
 def _is_one(cells: PlanCells, region: Cells, top: float, config: PlatformsConfig) -> bool:
@@ -144,5 +143,5 @@ def _is_one(cells: PlanCells, region: Cells, top: float, config: PlatformsConfig
         and (inside & high).sum() * cells.cell**2 >= config.filled
         and (edge & high).sum() <= config.walled * (edge & seen).sum()
         and judged.sum() >= config.ring * ring.sum()
-        and (judged & (np.abs(cells.tops) < top / 2)).sum() >= config.table * judged.sum()
+        and (judged & (cells.tops < top / 2)).sum() >= config.table * judged.sum()
     )

@@ -15,8 +15,12 @@ from moveit_messages import read_scene
 
 from brrp_cli.api import open_result
 from brrp_cli.geometry import transform_points
+from brrp_cli.grasping.hidden_space import NOTHING_HIDDEN
 from brrp_cli.grasping.plan import plan_grasps
 from brrp_cli.grasping.scene import scene_of
+from brrp_cli.planning.options import PlanOptions
+from brrp_cli.planning.scene import planned_objects, table_under
+from brrp_cli.segmentation.furniture import Furniture
 
 SIZE = (0.5, 0.45, 0.015)
 
@@ -63,12 +67,22 @@ def test_it_stands_on_the_table_and_cannot_move(folder):
     assert top == pytest.approx(0.0, abs=0.003)
 
 
+def test_the_table_lies_beneath_where_the_plane_is_that_of_a_platform(folder):
+    stored = open_result(folder.parent)
+    bodies = [each.body for each in planned_objects(stored, PlanOptions(collision="hull"))]
+    assert stored.plane is not None
+    usual, low = (table_under(bodies, stored.plane, Furniture(beneath=b)) for b in (0.0, 0.02))
+    assert usual.offset == pytest.approx(stored.plane.offset)
+    assert low.offset == pytest.approx(stored.plane.offset + 0.02)
+
+
 def test_hands_keep_out_of_it(folder):
     scene = scene_of(open_result(folder.parent))
     assert len(scene.solids) == 1
+    scene = replace(scene, loose=np.zeros((0, 3)), hidden=NOTHING_HIDDEN)
     among, without = (
         plan_grasps(each, per_object=20, min_score=0.0)
-        for each in (scene, replace(scene, solids=(), loose=np.zeros((0, 3))))
+        for each in (scene, replace(scene, solids=()))
     )
     # Its model may lie a little lower than its face.
     core = trimesh.creation.box((0.4, 0.4, 0.008)).apply_translation([0.0, 0.0, 0.005])
