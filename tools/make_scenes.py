@@ -24,6 +24,8 @@ where it has one: can on can, jar in bowl. It draws other scenes than a set with
 table is, and `--bin` in a bin. Both draw other scenes than a set without them.
 `--wall` puts a wall behind the objects, which is background, too. Depth and colours differ from a
 set without it.
+`--robot` lets the arm of a robot reach in over the objects. It is background, though no table.
+Depth and colours differ from a set without it.
 `--shelf` lets them stand in a compartment of a shelf, which is background, with cameras before it:
 `--elevation 5 30` sees in. It draws other scenes than a set without it.
 `--dark-table` makes the table, or what a shelf stands on, black and shiny. Depth and colours differ
@@ -98,6 +100,7 @@ def _size(_context: click.Context, _option: click.Parameter, value: str) -> tupl
 @click.option("--bin", "binned", is_flag=True, help="Drop objects into a bin.")
 @click.option("--wall", "walled", is_flag=True, help="Put a wall behind them.")
 @click.option("--shelf", "shelved", is_flag=True, help="Stand objects in a shelf.")
+@click.option("--robot", is_flag=True, help="Let an arm reach in over them.")
 @click.option("--dark-table", is_flag=True, help="A black and shiny one.")
 @click.option("--size", default="640x480", show_default=True, callback=_size)
 @click.option(
@@ -145,6 +148,7 @@ def main(
     binned: bool,
     walled: bool,
     shelved: bool,
+    robot: bool,
     dark_table: bool,
     size: tuple[int, int],
     distance: tuple[float, float],
@@ -163,9 +167,11 @@ def main(
             )
         if sum((stacked, on_platform, binned, shelved)) > 1:
             raise click.UsageError("--stack, --platform, --bin and --shelf exclude one another")
-        if walled and (on_platform or binned or shelved or views > 1):
+        held = on_platform or binned or shelved
+        if (walled or robot) and (held or (walled and robot) or views > 1):
             raise click.UsageError(
-                "--wall takes --views 1, whose back it is, no --platform, --bin or --shelf"
+                "--wall and --robot take --views 1, which decides where they stand; no --platform,"
+                " --bin or --shelf, and not both"
             )
         if data_root is None:
             if meshes is None:
@@ -200,6 +206,7 @@ def main(
             binned,
             walled,
             shelved,
+            robot,
             dark_table,
             Standpoint(distance, elevation, roll),
         )

@@ -227,6 +227,28 @@ class LeftOutConfig:
 
 
 @dataclass(frozen=True)
+class ReachingInConfig:
+    """What reaches in over the table through the air, as an arm does.
+
+    pixels : that it has at least, `cut` of them within `border` pixels of the image's border
+    lowest : percentile of its heights that counts as its lower end, which is `clear` metres or more
+        above the table; hidden : part of that end that may lie within `foot` pixels of the border
+    hides : part of what lies straight below it that it hides itself, from which on it may stand
+    rim : pixels beside it, where depth jumps, that are taken for a part of it
+    """
+
+    pixels: int = between(500, 1, 1_000_000)
+    border: int = between(4, 1, 64)
+    cut: int = between(20, 1, 10_000)
+    lowest: float = between(5.0, 0.0, 100.0)
+    clear: float = 0.03
+    foot: int = between(15, 1, 256)
+    hidden: float = share(0.1)
+    hides: float = share(0.5)
+    rim: int = between(3, 1, 64)
+
+
+@dataclass(frozen=True)
 class SegmentConfig:
     """Masks of what stands on the table, and in `prompt` those by a prompt, which use smooth_depth
     and table.
@@ -258,6 +280,7 @@ class SegmentConfig:
     concave_edges: ConcaveEdgesConfig = field(default_factory=ConcaveEdgesConfig)
     components: ComponentsConfig = field(default_factory=ComponentsConfig)
     affinities: AffinitiesConfig = field(default_factory=AffinitiesConfig)
+    reaching_in: ReachingInConfig = field(default_factory=ReachingInConfig)
     insides: FootprintsConfig = field(default_factory=FootprintsConfig)
     concavities: ConcavitiesConfig = field(default_factory=ConcavitiesConfig)
     stacks: StacksConfig = field(default_factory=StacksConfig)

@@ -25,6 +25,10 @@ class Rising:
     floor: Mask
     lift: NDArray[np.float64]
 
+    def without(self, away: Mask) -> Rising:
+        """The same, where pixels that are `away` (H, W) do not rise."""
+        return Rising(self.risen & ~away, self.rim & ~away, self.floor & ~away, self.lift)
+
 
 @kept_for_last_image
 def rising_in(_frame: Frame, seen: SeenSurfaces, config: SegmentConfig) -> Rising:

@@ -22,6 +22,7 @@ from brrp_cli.segmentation.fill_concavities import fill_inside
 from brrp_cli.segmentation.join_insides import join_insides
 from brrp_cli.segmentation.left_out import CUT, IN_THE_AIR, left_out, told
 from brrp_cli.segmentation.part_objects import Parted, part_objects
+from brrp_cli.segmentation.reaching_in import reaching_in
 from brrp_cli.segmentation.refine_borders import refine_borders
 from brrp_cli.segmentation.region_growing import fill_holes, grow
 from brrp_cli.segmentation.rising import rising_in
@@ -69,14 +70,15 @@ def segment_and_aside(
     points, table = seen.points, seen.table
     rises = rising_in(frame, seen, config)
     parted = part_objects(frame, seen, rises.risen, config)
-    objects = join_insides(
-        parted.labels, seen.plan, seen.height, table.plan(seen.normals), config.insides
-    )
+    away = reaching_in(frame, seen, rises.lift, config)
+    labels, reaching = _parted_from(parted.labels, away)
+    rises = rises.without(away)
+    objects = join_insides(labels, seen.plan, seen.height, table.plan(seen.normals), config.insides)
     objects = split_stacks(objects, frame.rgb, seen.height, config.stacks)
     segmap = absorb_small(objects, parted.border, ~_are_large(objects, frame, parted, config))
     # Pixels at edges, which were left out of the smoothed depth, join what they lie next to.
     edges = frame.valid & ~seen.valid
-    edges &= _may_rise(frame, table, rises.lift, config)
+    edges &= _may_rise(frame, table, rises.lift, config) & ~away
     points = np.where(edges[..., None], frame.points, points)
     segmap = grow(segmap, points, rises.rim | edges, config.reach)
     # Specks would grow with their borders.
@@ -84,11 +86,14 @@ def segment_and_aside(
     # What the network takes for table stays table, whatever stands around it.
     floors = rises.floor & (parted.object > config.concavities.object)
     filled = fill_inside(segmap, table.plan(points), floors, config.concavities)
-    segmap = refine_borders(filled, frame.rgb, filled != segmap, config.borders)
+    changed, known = filled != segmap, int(filled.max())
+    # Back to where it is: a border with it is none with the table.
+    filled = np.where((filled == BACKGROUND) & (reaching > 0), reaching + known, filled)
+    segmap = refine_borders(filled, frame.rgb, changed, config.borders)
     segmap = _large(fill_holes(segmap, ~frame.valid), frame, parted, config)
     aside = np.zeros_like(segmap)
     if not keep_all:
-        segmap, aside = _without(segmap, frame, table, config)
+        segmap, aside = _without(segmap, known, frame, table, config)
     return _numbered(segmap if segmap.any() else aside, frame, config), aside
 
 
@@ -104,6 +109,17 @@ def nothing_stands(frame: Frame, found: str = LEFT_OUT_ALONE) -> FrameError:
     )
 
 
+def _parted_from(
+    labels: NDArray[np.int64], away: NDArray[np.bool_]
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Labels (H, W) without pixels that are `away` (H, W), and those of which most is."""
+    count = np.bincount(labels.ravel())
+    mostly = 2 * np.bincount(labels[away], minlength=len(count)) > count
+    mostly[BACKGROUND] = False
+    theirs = mostly[labels]
+    return np.where(theirs | away, BACKGROUND, labels), np.where(theirs, labels, BACKGROUND)
+
+
 def _may_rise(
     frame: Frame, table: Table, lift: NDArray[np.float64], config: SegmentConfig
 ) -> NDArray[np.bool_]:
@@ -115,24 +131,24 @@ def _may_rise(
 
 
 def _without(
-    segmap: NDArray[np.int64], frame: Frame, table: Table, config: SegmentConfig
+    segmap: NDArray[np.int64], known: int, frame: Frame, table: Table, config: SegmentConfig
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """The masks without those that are left out, which the log tells, and of the latter those that
-    a stored object may explain."""
+    a stored object may explain. Masks over `known` reach in through the air."""
     points = np.where(frame.valid[..., None], frame.points, np.nan)
     height = table.height(points)
     over, masked = np.zeros(frame.shape, dtype=bool), (segmap > 0) & frame.valid
     over[masked] = table.holds(table.plan(points[masked]), 0.0)
     bare = bare_pixels(frame, segmap, height, table, config.table)
     # What hides its own foot, as from above, is not seen to hang.
+    found = left_out(segmap, points[..., 2], height, over, bare, config.left_out)
     reasons = {
         i: reason
-        for i, reason in left_out(
-            segmap, points[..., 2], height, over, bare, config.left_out
-        ).items()
+        for i, reason in found.items()
         if reason != IN_THE_AIR
         or not hides_its_foot(segmap == i, frame, table.plane, over, config.left_out)
     }
+    reasons |= {i: found.get(i, IN_THE_AIR) for i in np.unique(segmap[segmap > known]).tolist()}
     if reasons:
         log.info("Masks left out, unless recognised: %s (--all keeps them)", told(reasons))
     out = np.isin(segmap, list(reasons))

@@ -1,4 +1,4 @@
-"""Scenes in a bin, on a platform, in a shelf, before a wall, and on one another."""
+"""Scenes in a bin, on a platform, in a shelf, before a wall, under an arm, and on one another."""
 
 from __future__ import annotations
 
@@ -12,8 +12,10 @@ pytest.importorskip("pybullet")
 
 from made_scenes import bytes_of, generate, write_box, write_two
 from tabletop.bin import draw_bin
+from tabletop.camera import draw_camera
 from tabletop.models import find_meshes, load_model
 from tabletop.platform import draw_platform
+from tabletop.robot import CLEARANCE, SIDE, draw_robot
 from tabletop.settle import rotation
 from tabletop.shelf import BESIDE, draw_shelf
 from tabletop.stack import stack
@@ -151,16 +153,58 @@ def test_a_wall_stands_behind_what_the_camera_sees_and_moves_nothing(data):
         assert abs(spread[2][2] @ [0, 0, 1]) < 1e-3, "that stands upright"
 
 
+def test_an_arm_reaches_in_over_the_objects_and_moves_nothing(data):
+    for folder, more in (("alone", ()), ("manned", ("--robot",)), ("manned_again", ("--robot",))):
+        result = generate(data, data / folder, "--scenes", 2, "--views", 1, *more)
+        assert result.exit_code == 0, result.output
+    assert bytes_of(data / "manned") == bytes_of(data / "manned_again")
+    scenes = zip(find_scenes(data / "alone"), find_scenes(data / "manned"), strict=True)
+    for alone, manned in scenes:
+        poses = [[each.T_world_object for each in scene.objects] for scene in (alone, manned)]
+        assert np.array_equal(*poses)
+        before, frame = alone.view(0), manned.view(0)
+        new = frame.valid & ~(np.abs(frame.depth - before.depth) < 1e-3)
+        assert new.mean() > 0.02 and (frame.segmap[new] == 0).all(), "it is background"
+        assert not (frame.depth[new] > before.depth[new] + 1e-3).any(), "and hides what is behind"
+        assert (before.segmap == frame.segmap)[~new].all()
+        points = transform_points(frame.T_world_cam, frame.points[new].astype(np.float64))
+        highest = max(true_mesh(each, data).bounds[1, 2] for each in manned.objects)
+        near = np.linalg.norm(points[:, :2], axis=1) < 0.2
+        assert points[near, 2].min() > 0.01 and points[:, 2].max() > highest
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_an_arms_hand_is_over_what_is_beneath_it(seed):
+    camera = draw_camera(np.zeros(3), (64, 48), np.random.default_rng(seed))
+    side = np.linspace(-0.3, 0.3, 13)
+    things = np.stack([*(each.ravel() for each in np.meshgrid(side, side)), np.full(169, 0.1)], 1)
+    robot = draw_robot(things, camera, np.random.default_rng(seed))
+    corners = [trimesh.creation.box(2 * p.half, _pose(p)).vertices for p in robot.panels()]
+    palm, *fingers = (np.asarray(each) for each in corners[:3])
+    gap = min(each[:, 2].min() for each in fingers) - 0.1
+    assert CLEARANCE[0] - 1e-9 < gap < CLEARANCE[1], "fingers end over the highest thing"
+    assert palm[:, 2].mean() > max(each[:, 2].mean() for each in fingers)
+    shoulder = np.concatenate(corners[3:])
+    farthest = shoulder[np.argmax(np.linalg.norm(shoulder[:, :2], axis=1)), :2]
+    assert np.linalg.norm(farthest) > 0.4
+    towards = np.array([camera.view[2, 0], camera.view[2, 1]])
+    cosine = farthest @ towards / np.linalg.norm(farthest) / np.linalg.norm(towards)
+    assert cosine < np.cos(np.deg2rad(SIDE[0] - 25)), "it does not come from the camera's side"
+
+
 @pytest.mark.parametrize(
     ("options", "told"),
     [
         (("--bin", "--stack"), "exclude one another"),
         (("--bin", "--shelf"), "exclude one another"),
         (("--platform", "--bin"), "exclude one another"),
-        (("--wall", "--platform"), "--wall takes --views 1"),
-        (("--wall", "--shelf"), "--wall takes --views 1"),
-        (("--wall", "--bin"), "--wall takes --views 1"),
-        (("--wall", "--views", 2), "--wall takes --views 1"),
+        (("--wall", "--platform"), "take --views 1"),
+        (("--wall", "--shelf"), "take --views 1"),
+        (("--wall", "--bin"), "take --views 1"),
+        (("--wall", "--views", 2), "take --views 1"),
+        (("--robot", "--views", 2), "take --views 1"),
+        (("--robot", "--bin"), "take --views 1"),
+        (("--robot", "--wall"), "not both"),
     ],
 )
 def test_what_does_not_go_together_is_told(data, options, told):

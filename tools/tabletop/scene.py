@@ -29,6 +29,7 @@ from tabletop.light import draw_light, relight
 from tabletop.models import Model, load_model
 from tabletop.platform import Platform, draw_platform
 from tabletop.render import NOTHING, Picture, draw_look, render
+from tabletop.robot import draw_robot
 from tabletop.settle import Pose, drop
 from tabletop.shelf import Shelf, draw_shelf
 from tabletop.stack import stack
@@ -50,7 +51,8 @@ class Plan:
     `size`: (width, height); `sensor`: one of `SENSOR_NAMES`, instead of noise; `stacked`: every
     second object is dropped onto the one before it; `on_platform`: objects lie on a platform;
     `binned`: in a bin; `walled`: a wall stands behind them, as the first camera sees them;
-    `shelved`: they stand in a shelf; `dark_table`: it is black and shiny; `standpoint`: where
+    `shelved`: they stand in a shelf; `robot`: an arm reaches in over them, from a side on which
+    the first camera is not; `dark_table`: it is black and shiny; `standpoint`: where
     cameras stand."""
 
     meshes: tuple[Path, ...]
@@ -68,6 +70,7 @@ class Plan:
     binned: bool = False
     walled: bool = False
     shelved: bool = False
+    robot: bool = False
     dark_table: bool = False
     standpoint: Standpoint = field(default_factory=Standpoint)
 
@@ -114,6 +117,9 @@ def make_scene(plan: Plan, number: int, check: bool) -> list[Distance]:
     if plan.walled:
         wall_rng = child_rng(plan.seed, "scene", number, "wall")
         furniture = draw_wall(np.concatenate(hulls), cameras[0], wall_rng)
+    if plan.robot:
+        robot_rng = child_rng(plan.seed, "scene", number, "robot")
+        furniture = draw_robot(np.concatenate(hulls), cameras[0], robot_rng)
     pictures = render(models, poses, look, cameras, plan.size, furniture)
     if plan.light == "varied":
         light_rng = child_rng(plan.seed, "scene", number, "light")

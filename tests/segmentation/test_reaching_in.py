@@ -1,0 +1,105 @@
+"""An arm that reaches in over the table is known, and what stands or lies there is none."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import room_scene
+import trimesh
+
+from brrp_cli.config.segmentation import SegmentConfig
+from brrp_cli.frames.frame import Frame
+from brrp_cli.segmentation.reaching_in import reaching_in
+from brrp_cli.segmentation.rising import rising
+from brrp_cli.segmentation.seen_surfaces import see_surfaces
+from brrp_cli.segmentation.segment import segment, segment_and_aside
+from brrp_cli.shapes import solids
+
+CONFIG = SegmentConfig()
+ELEVATION, DISTANCE = 0.6, 0.7
+
+
+def arm(tip=(0.0, 0.0, 0.2), end=(-0.5, 0.6, 0.4)) -> trimesh.Trimesh:
+    """From above the things to beyond the image."""
+    return trimesh.creation.cylinder(0.035, segment=[tip, end])
+
+
+def photograph(things, elevation=ELEVATION, distance=DISTANCE) -> Frame:
+    return room_scene.photograph(things, [room_scene.TABLE], elevation=elevation, distance=distance)
+
+
+def found_in(frame: Frame) -> np.ndarray:
+    seen = see_surfaces(frame, 0, CONFIG)
+    return reaching_in(frame, seen, rising(seen, CONFIG).lift, CONFIG)
+
+
+def overlaps(masks: np.ndarray, frame: Frame, ids) -> list[float]:
+    """The best overlap of a mask with each true one."""
+    best = []
+    for true in (frame.segmap == i for i in ids):
+        mine = (masks == i for i in np.unique(masks[masks > 0]))
+        best.append(max(float((m & true).sum() / (m | true).sum()) for m in mine))
+    return best
+
+
+@pytest.mark.parametrize("end", [(-0.5, 0.6, 0.4), (-0.9, -0.2, 0.3), (-0.3, -0.9, 0.2)])
+def test_an_arm_over_the_table_is_found_and_nothing_else(end):
+    frame = photograph([*room_scene.THINGS, arm(end=end)])
+    true = frame.segmap == 3
+    found = found_in(frame)
+    assert (found & true).sum() > 0.9 * true.sum()
+    assert (found & ~true).sum() < 0.02 * true.sum()
+
+
+def test_what_stands_is_none_though_the_border_cuts_it():
+    pillar = solids.moved(solids.box(0.06, 0.06, 0.6), x=-0.1, y=0.1)
+    frame = photograph([*room_scene.THINGS, pillar])
+    assert frame.segmap[0].any(), "the border cuts it"
+    assert not found_in(frame).any()
+
+
+def test_what_stands_is_none_though_its_foot_is_beyond_the_image_or_hidden():
+    before = room_scene.turned(solids.moved(solids.box(0.1, 0.1, 0.2), x=0.18), room_scene.YAW)
+    frame = photograph([*room_scene.THINGS, before], distance=0.5)
+    assert frame.segmap[-1].any(), "the border cuts its foot off"
+    assert not found_in(frame).any()
+    beneath = solids.moved(solids.box(0.5, 0.12, 0.15), y=0.1)
+    above = photograph([beneath], elevation=1.5, distance=0.5)
+    assert (above.segmap[0] == 1).any() or (above.segmap[-1] == 1).any()
+    assert not found_in(above).any(), "seen from above it shows no foot"
+
+
+def test_what_hangs_within_the_image_is_none():
+    hanging = solids.moved(solids.box(0.06, 0.06, 0.05), z=0.2)
+    assert not found_in(photograph([*room_scene.THINGS, hanging])).any()
+
+
+def test_before_a_wall_nothing_is_taken_for_an_arm():
+    things = [*room_scene.THINGS, arm()]
+    background = [room_scene.TABLE, room_scene.wall()]
+    frame = room_scene.photograph(things, background, elevation=0.25)
+    assert see_surfaces(frame, 0, CONFIG).table.walled
+    assert not found_in(frame).any()
+
+
+def test_masks_beneath_an_arm_are_those_without_it_and_it_is_not_forgotten():
+    bowl = solids.spherical_bowl(0.04, 0.09, 0.04, 0.004)
+    things = [bowl, solids.moved(solids.box(0.05, 0.05, 0.08), x=0.02, y=-0.14)]
+    # As of a bowl's inside, what is seen of the arm faces the middle of both.
+    frame = photograph([*things, arm(tip=(0.0, 0.06, 0.2), end=(0.61, -0.67, 0.36))])
+    masks, aside = segment_and_aside(frame)
+    assert masks.max() == 2
+    assert min(overlaps(masks, frame, (1, 2))) > 0.95
+    assert overlaps(aside, frame, (3,))[0] > 0.85
+    assert overlaps(segment(frame, keep_all=True), frame, (3,))[0] > 0.85
+
+
+def test_a_thing_in_a_hand_has_a_mask_of_its_own_that_is_not_forgotten():
+    held = solids.moved(solids.box(0.05, 0.05, 0.1), z=0.12)
+    frame = photograph([*room_scene.THINGS, held, arm(tip=(-0.03, 0.0, 0.25))])
+    frame = replace(frame, rgb=np.where(frame.segmap[..., None] == 4, np.uint8(230), frame.rgb))
+    masks, aside = segment_and_aside(frame)
+    assert masks.max() == 2
+    assert overlaps(aside, frame, (3,))[0] > 0.6
