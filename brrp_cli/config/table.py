@@ -147,7 +147,8 @@ class PlatformsConfig:
     rectangle : part of the one around it that is filled, from which on it is one; gap : cells
     by which what is level is joined
     lies : what rises more over it lies on it; filled : metres squared of that, or the platform is
-    empty, and a thing itself; walled : part of its edge that rises so, from which on it is a tray
+    empty, and a thing itself; sides : into which its edge is parted, each of which rises where
+    `rises` of it does; walled : part of them that do, from which on it is a tray
     ring : part of what lies around it that is seen, at least; table : part of that which is table
     around : metres beside it that may be its edge; rounds : times that the table's plane is fitted
     to what lies beside it
@@ -166,7 +167,9 @@ class PlatformsConfig:
     gap: int = between(2, 1, 16)
     lies: float = 0.012
     filled: float = 0.0004
-    walled: float = share(0.2)
+    sides: int = between(12, 3, 64)
+    rises: float = share(0.15)
+    walled: float = share(0.7)
     ring: float = share(0.3)
     table: float = share(0.6)
     around: float = 0.01

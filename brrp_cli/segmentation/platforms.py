@@ -141,7 +141,19 @@ def _is_one(cells: PlanCells, region: Cells, top: float, config: PlatformsConfig
         top >= config.least_height
         and region.sum() * cells.cell**2 >= config.area
         and (inside & high).sum() * cells.cell**2 >= config.filled
-        and (edge & high).sum() <= config.walled * (edge & seen).sum()
+        and not _is_walled(cells, edge & seen, high, config)
         and judged.sum() >= config.ring * ring.sum()
         and (judged & (cells.tops < top / 2)).sum() >= config.table * judged.sum()
     )
+
+
+def _is_walled(cells: PlanCells, edge: Cells, high: Cells, config: PlatformsConfig) -> bool:
+    """Whether an edge rises on most sides, as that of a tray does: things lie over it on a few."""
+    middles = cells.middles.reshape(*edge.shape, 2)[edge]
+    x, y = (middles - middles.mean(axis=0)).T
+    side = (
+        np.floor((np.arctan2(y, x) / (2 * np.pi) + 0.5) * config.sides).astype(int) % config.sides
+    )
+    seen = np.bincount(side, minlength=config.sides)
+    rises = np.bincount(side[high[edge]], minlength=config.sides) > config.rises * seen
+    return bool(rises.sum() >= config.walled * (seen > 0).sum())

@@ -93,7 +93,19 @@ def test_a_small_one_is_a_thing_with_another_on_it():
 def test_a_tray_is_a_thing():
     outer = solids.box(LENGTH, WIDTH, 0.035)
     hollow = solids.moved(solids.box(LENGTH - 0.02, WIDTH - 0.02, 0.05), z=0.008)
-    assert platforms_of(seen(bin=solids.difference(outer, hollow))) == ()
+    tray = solids.difference(outer, hollow)
+    thing = standing((0.08, 0.06, 0.07), 0.06, 0.03, on=0.008)
+    assert platforms_of(seen(thing, bin=tray)) == ()
+
+
+def test_one_with_things_over_its_edges_is_no_tray():
+    over = [
+        standing((0.1, 0.2, 0.06), LENGTH / 2, 0.0),
+        standing((0.2, 0.1, 0.06), -0.05, WIDTH / 2),
+        standing((0.08, 0.08, 0.06), -LENGTH / 2, -0.08),
+    ]
+    (one,) = platforms_of(seen(*over, bin=platform()))
+    assert one.height == pytest.approx(HEIGHT, abs=0.001)
 
 
 def around(frame: Frame) -> tuple[Furniture, Plane]:
