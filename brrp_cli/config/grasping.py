@@ -15,6 +15,8 @@ class SurroundingsConfig:
     rises : what is lower over the table is the table; reach : of what is farther from all objects a
     hand cannot get to; beside : what is nearer to an object may be depth that bled from it; cell :
     of the grid that they are thinned on
+    arms : whether a hand keeps out of what reaches in through the air as well, which is an arm that
+    moves, the robot's own as often as not
     angle : tangent between cells of the image in which they hide what is behind; behind : metres
     along z from them to there; across, along : points of a part of a hand from side to side, and
     along its fingers, that are held against that
@@ -24,6 +26,7 @@ class SurroundingsConfig:
     reach: float = 0.25
     beside: float = 0.02
     cell: float = 0.008
+    arms: bool = False
     angle: float = 0.015
     behind: float = 0.02
     across: int = between(3, 2, 100)

@@ -234,6 +234,8 @@ class ReachingInConfig:
     lowest : percentile of its heights that counts as its lower end, which is `clear` metres or more
         above the table; hidden : part of that end that may lie within `foot` pixels of the border
     hides : part of what lies straight below it that it hides itself, from which on it may stand
+    near : metres to parts of it that are seen apart from it, `part` pixels at least; every : of its
+        points one in so many is looked at for that
     rim : pixels beside it, where depth jumps, that are taken for a part of it
     """
 
@@ -245,6 +247,9 @@ class ReachingInConfig:
     foot: int = between(15, 1, 256)
     hidden: float = share(0.1)
     hides: float = share(0.5)
+    near: float = 0.05
+    part: int = between(30, 1, 1_000_000)
+    every: int = between(4, 1, 1000)
     rim: int = between(3, 1, 64)
 
 

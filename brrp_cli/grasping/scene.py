@@ -22,6 +22,7 @@ from brrp_cli.reconstruction import OccupancyPosterior, Reconstruction
 from brrp_cli.results.read import StoredResult
 from brrp_cli.segmentation.bin_walls import Solid
 from brrp_cli.segmentation.furniture import furniture, segmentation_of
+from brrp_cli.segmentation.reaching_in import arms_in
 
 Array = NDArray[np.float64]
 
@@ -100,8 +101,9 @@ def _stored(stored: StoredResult, around: SurroundingsConfig) -> GraspScene:
         if item["mesh"] is None
     }
     plane, masks = stored.plane_cam, segmentation_of(stored.record["segmentation"])
-    loose, hidden = _loose(stored.frame, plane, objects, without, around, masks)
-    found = furniture(stored.frame, plane, stored.record["seed"], masks)
+    seed = stored.record["seed"]
+    loose, hidden = _loose(stored.frame, plane, objects, without, around, masks, seed)
+    found = furniture(stored.frame, plane, seed, masks)
     table = None if plane is None else found.table(plane)
     return GraspScene(objects, table, without, loose, stored.surface_config, found.solids, hidden)
 
@@ -120,7 +122,7 @@ def _computed(result: Reconstruction, around: SurroundingsConfig) -> GraspScene:
     ]
     without = {o.object_id: o.message or o.status for o in result.objects if o.surface is None}
     masks = segmentation_of(result.segmentation)
-    loose, hidden = _loose(result.frame, result.plane, objects, without, around, masks)
+    loose, hidden = _loose(result.frame, result.plane, objects, without, around, masks, result.seed)
     numbers = result.configuration.get("surface", {})
     surface = changed(SurfaceConfig(), numbers, "the reconstruction", "surface.")
     found = furniture(result.frame, result.plane, result.seed, masks)
@@ -135,13 +137,15 @@ def _loose(
     without: dict[int, str],
     config: SurroundingsConfig,
     masks: SegmentConfig,
+    seed: int,
 ) -> tuple[Array, HiddenSpace]:
     """(n, 3) observed points that a hand keeps out of, of objects without a mesh and of none, and
     the space behind the latter."""
     clouds = [frame.object_points(i) for i in without]
     surfaces = [each for item in objects for each in (item.vertices, item.observed)]
     known = _joined([*surfaces, *clouds])
-    around = standing_around(frame, plane, known, config, masks.smooth_depth)
+    arms = None if config.arms else arms_in(frame, seed, masks)
+    around = standing_around(frame, plane, known, config, masks.smooth_depth, arms)
     return _joined([*clouds, around]), hidden_behind(around, config)
 
 

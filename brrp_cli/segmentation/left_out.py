@@ -19,6 +19,7 @@ from brrp_cli.dependencies import import_library
 CUT = "cut by the image's border"
 IN_THE_AIR = "off the support surface"
 EDGE = "smeared over the table's edge"
+REACHES_IN = "reaching in through the air"  # reaching_in.py
 
 
 def left_out(
@@ -58,7 +59,7 @@ def left_out(
         is_over = over[window][mask].mean() > config.over
         round_stands = config.over_stands if is_over else config.round_stands
         around = (segmap[window], depth[window], height[window], bare[window])
-        if not _stands(mask, *around, round_stands, config):
+        if not stands(mask, *around, round_stands, config):
             reasons[object_id] = IN_THE_AIR
     return reasons
 
@@ -79,7 +80,10 @@ def border_share(mask: NDArray[np.bool_]) -> float:
 
 def told(reasons: Mapping[int, str]) -> str:
     """How many masks were left out and why, in words."""
-    kinds = [(reason, list(reasons.values()).count(reason)) for reason in (CUT, IN_THE_AIR, EDGE)]
+    kinds = [
+        (reason, list(reasons.values()).count(reason))
+        for reason in (REACHES_IN, CUT, IN_THE_AIR, EDGE)
+    ]
     return ", ".join(f"{count} {reason}" for reason, count in kinds if count)
 
 
@@ -99,9 +103,9 @@ def _at_the_edge(
     return bool(farther.sum() > config.edge_share * max(int(around.sum()), 1))
 
 
-def _stands(
+def stands(
     mask: NDArray[np.bool_],
-    segmap: NDArray[np.int64],
+    segmap: NDArray[np.integer],
     depth: NDArray[np.floating],
     height: NDArray[np.floating],
     bare: NDArray[np.bool_],

@@ -20,7 +20,7 @@ from brrp_cli.segmentation.beneath import hides_its_foot
 from brrp_cli.segmentation.components import absorb_small
 from brrp_cli.segmentation.fill_concavities import fill_inside
 from brrp_cli.segmentation.join_insides import join_insides
-from brrp_cli.segmentation.left_out import CUT, IN_THE_AIR, left_out, told
+from brrp_cli.segmentation.left_out import CUT, IN_THE_AIR, REACHES_IN, left_out, told
 from brrp_cli.segmentation.part_objects import Parted, part_objects
 from brrp_cli.segmentation.reaching_in import reaching_in
 from brrp_cli.segmentation.refine_borders import refine_borders
@@ -36,6 +36,7 @@ LEFT_OUT_ALONE = (
     "only what the image's border cuts, what seems to stand nowhere, or smears of depth,"
     " and no stored object in it"
 )
+REACHES_IN_ALONE = "only what reaches in over the table from outside, as an arm does"
 
 
 def segment(
@@ -94,6 +95,8 @@ def segment_and_aside(
     aside = np.zeros_like(segmap)
     if not keep_all:
         segmap, aside = _without(segmap, known, frame, table, config)
+        if away.any() and not (segmap.any() or aside.any()):
+            raise nothing_stands(frame, REACHES_IN_ALONE)
     return _numbered(segmap if segmap.any() else aside, frame, config), aside
 
 
@@ -134,7 +137,8 @@ def _without(
     segmap: NDArray[np.int64], known: int, frame: Frame, table: Table, config: SegmentConfig
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """The masks without those that are left out, which the log tells, and of the latter those that
-    a stored object may explain. Masks over `known` reach in through the air."""
+    a stored object may explain. Masks over `known` reach in through the air: links of an arm often
+    look like stored objects."""
     points = np.where(frame.valid[..., None], frame.points, np.nan)
     height = table.height(points)
     over, masked = np.zeros(frame.shape, dtype=bool), (segmap > 0) & frame.valid
@@ -148,16 +152,20 @@ def _without(
         if reason != IN_THE_AIR
         or not hides_its_foot(segmap == i, frame, table.plane, over, config.left_out)
     }
-    reasons |= {i: found.get(i, IN_THE_AIR) for i in np.unique(segmap[segmap > known]).tolist()}
+    reasons |= dict.fromkeys(np.unique(segmap[segmap > known]).tolist(), REACHES_IN)
     if reasons:
         log.info("Masks left out, unless recognised: %s (--all keeps them)", told(reasons))
     out = np.isin(segmap, list(reasons))
     # Of what shows a corner of itself alone, many stored objects could tell the rest.
     shown = np.bincount(segmap[frame.valid], minlength=int(segmap.max()) + 1)
-    corners = [i for i, why in reasons.items() if why == CUT and shown[i] < config.left_out.tell]
+    never = [
+        i
+        for i, why in reasons.items()
+        if why == REACHES_IN or (why == CUT and shown[i] < config.left_out.tell)
+    ]
     return (
         np.where(out, BACKGROUND, segmap),
-        np.where(out & ~np.isin(segmap, corners), segmap, BACKGROUND),
+        np.where(out & ~np.isin(segmap, never), segmap, BACKGROUND),
     )
 
 

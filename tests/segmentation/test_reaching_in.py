@@ -8,8 +8,11 @@ import numpy as np
 import pytest
 import room_scene
 import trimesh
+from scipy.ndimage import binary_dilation
 
 from brrp_cli.config.segmentation import SegmentConfig
+from brrp_cli.errors import FrameError
+from brrp_cli.frames.build import make_frame
 from brrp_cli.frames.frame import Frame
 from brrp_cli.segmentation.reaching_in import reaching_in
 from brrp_cli.segmentation.rising import rising
@@ -53,6 +56,20 @@ def test_an_arm_over_the_table_is_found_and_nothing_else(end):
     assert (found & ~true).sum() < 0.02 * true.sum()
 
 
+def test_a_hand_that_is_seen_apart_from_its_arm_is_a_part_of_it_and_what_it_hangs_over_is_none():
+    hand = solids.moved(solids.box(0.06, 0.06, 0.05), z=0.2)
+    # A top that stands on a box is as high.
+    box, top = solids.box(0.1, 0.1, 0.1), solids.moved(solids.box(0.04, 0.04, 0.05), z=0.1)
+    frame = photograph([box, top, hand, arm(tip=(-0.05, 0.06, 0.26))])
+    depth = frame.depth.copy()
+    depth[binary_dilation(frame.segmap == 4, iterations=2) & (frame.segmap == 3)] = 0
+    parted = make_frame(rgb=frame.rgb, depth=depth, K=frame.K, segmap=frame.segmap)
+    found = found_in(parted)
+    seen = parted.valid & (frame.segmap == 3)
+    assert found[seen].mean() > 0.85 and found[frame.segmap == 4].mean() > 0.9
+    assert found[(frame.segmap == 1) | (frame.segmap == 2)].mean() < 0.02
+
+
 def test_what_stands_is_none_though_the_border_cuts_it():
     pillar = solids.moved(solids.box(0.06, 0.06, 0.6), x=-0.1, y=0.1)
     frame = photograph([*room_scene.THINGS, pillar])
@@ -84,7 +101,7 @@ def test_before_a_wall_nothing_is_taken_for_an_arm():
     assert not found_in(frame).any()
 
 
-def test_masks_beneath_an_arm_are_those_without_it_and_it_is_not_forgotten():
+def test_masks_beneath_an_arm_are_those_without_it_and_it_has_one_on_demand():
     bowl = solids.spherical_bowl(0.04, 0.09, 0.04, 0.004)
     things = [bowl, solids.moved(solids.box(0.05, 0.05, 0.08), x=0.02, y=-0.14)]
     # As of a bowl's inside, what is seen of the arm faces the middle of both.
@@ -92,14 +109,20 @@ def test_masks_beneath_an_arm_are_those_without_it_and_it_is_not_forgotten():
     masks, aside = segment_and_aside(frame)
     assert masks.max() == 2
     assert min(overlaps(masks, frame, (1, 2))) > 0.95
-    assert overlaps(aside, frame, (3,))[0] > 0.85
+    assert not aside[frame.segmap == 3].any(), "nor is it tried against stored objects"
     assert overlaps(segment(frame, keep_all=True), frame, (3,))[0] > 0.85
 
 
-def test_a_thing_in_a_hand_has_a_mask_of_its_own_that_is_not_forgotten():
+def test_where_an_arm_is_all_that_is_told_and_all_keeps_it():
+    frame = photograph([arm()])
+    with pytest.raises(FrameError, match="only what reaches in over the table"):
+        segment_and_aside(frame)
+    assert overlaps(segment(frame, keep_all=True), frame, (1,))[0] > 0.85
+
+
+def test_a_thing_in_a_hand_has_a_mask_of_its_own_on_demand():
     held = solids.moved(solids.box(0.05, 0.05, 0.1), z=0.12)
     frame = photograph([*room_scene.THINGS, held, arm(tip=(-0.03, 0.0, 0.25))])
     frame = replace(frame, rgb=np.where(frame.segmap[..., None] == 4, np.uint8(230), frame.rgb))
-    masks, aside = segment_and_aside(frame)
-    assert masks.max() == 2
-    assert overlaps(aside, frame, (3,))[0] > 0.6
+    assert segment(frame).max() == 2
+    assert overlaps(segment(frame, keep_all=True), frame, (3,))[0] > 0.6
