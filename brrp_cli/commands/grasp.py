@@ -10,7 +10,7 @@ import click
 
 from brrp_cli.commands.json_option import json_option, report_of
 from brrp_cli.commands.seed_option import SEED, SEED_HELP
-from brrp_cli.config.grasping import GraspConfig
+from brrp_cli.config.grasping import GraspConfig, SurroundingsConfig
 from brrp_cli.grasping.gripper_file import DEFAULT, gripper_names, open_gripper
 from brrp_cli.grasping.layouts import LAYOUTS
 from brrp_cli.grasping.options import ALL, APPROACHES, MIN_SCORE, PER_OBJECT
@@ -75,6 +75,12 @@ GRIPPER_HELP = f"{', '.join(gripper_names())}, or a YAML file."
     "their meshes.",
 )
 @click.option(
+    "--avoid-arms",
+    is_flag=True,
+    help="Keep out of arms that reach into the image through the air, too. Without it they are "
+    "taken for the robot's own, which moves.",
+)
+@click.option(
     "--format",
     "layout",
     type=click.Choice([JSON, *LAYOUTS]),
@@ -95,6 +101,7 @@ def command(
     min_score: float,
     friction: float,
     confidence: float,
+    avoid_arms: bool,
     layout: str,
     seed: int,
     as_json: bool,
@@ -119,7 +126,12 @@ def command(
     for path in [] if output is None else files_of(output, layout):
         refuse_existing(path, overwrite=overwrite)
     stored = open_result(results)
-    config = replace(GraspConfig(), friction=friction, confidence=confidence)
+    config = replace(
+        GraspConfig(),
+        friction=friction,
+        confidence=confidence,
+        surroundings=SurroundingsConfig(arms=avoid_arms),
+    )
     with report_of(as_json) as report:
         plan = grasp(
             stored,

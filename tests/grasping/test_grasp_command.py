@@ -11,7 +11,8 @@ import pytest
 import trimesh
 from click.testing import CliRunner
 from made_result import BOX, ELL, SPECK, truth, write_made_result
-from table_scene import T_WORLD_CAM, TABLE
+from table_scene import T_CAM_WORLD, T_WORLD_CAM, TABLE
+from table_scene import in_camera as in_camera_frame
 
 from brrp_cli import open_gripper, open_result, plan_grasps
 from brrp_cli.cli import main
@@ -179,6 +180,20 @@ def test_options_decide(results, tmp_path):
             assert grasp["score"] >= 0.5
     code, output = run(results, "-o", out)
     assert code == 1 and "--overwrite" in output
+
+
+def test_a_hand_keeps_out_of_an_arm_on_demand_alone(tmp_path, planned):
+    reach = trimesh.creation.cylinder(0.05, segment=[(-0.1, 0.05, 0.22), (0.0, 0.9, 0.35)])
+    under = write_made_result(tmp_path / "under", unmasked=in_camera_frame(reach, T_CAM_WORLD))
+    blocked = []
+    for options in ((), ("--avoid-arms",)):
+        code, _ = run(under, "-o", tmp_path / "g.json", "--overwrite", *options)
+        assert code == 0
+        record = json.loads((tmp_path / "g.json").read_text())
+        assert record["config"]["surroundings"]["arms"] is bool(options)
+        blocked.append(of(record, BOX)["fell"]["neighbour"])
+    free = of(planned[0], BOX)["fell"]["neighbour"]
+    assert abs(blocked[0] - free) < 0.05 * (blocked[1] - free)
 
 
 def message(*arguments: object) -> str:
