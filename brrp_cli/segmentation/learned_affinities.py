@@ -36,7 +36,8 @@ T = TypeVar("T", bound=np.generic)
 # In the file's metadata, beside `network` and `training`, which are JSON.
 FORMAT = "brrp affinities 3"
 WHAT = "the network that parts objects"
-# Of tables, and of what lies in a bin, in a shelf or before a wall, which the former never saw.
+# Of tables, and of what lies in a bin, in a shelf, before a wall or on a platform, which the former
+# never saw.
 NAME, WALLED_NAME = "affinities.onnx", "affinities_walled.onnx"
 CHANNELS_IN, PROBABILITIES_OUT = "channels", "probabilities"
 
@@ -86,10 +87,11 @@ class Affinities:
 @kept_for_last_image
 def affinities_in(frame: Frame, seen: SeenSurfaces, config: SegmentConfig) -> Affinities:
     """What the network that comes with the package says of a frame and the surfaces seen in it, of
-    what rises and what is near it. Where there are walls, it is the network that knows them."""
+    what rises and what is near it. Where there is more than a table, it is the network that knows
+    walls."""
     risen = rising_in(frame, seen, config).risen
     own = config.affinities
-    network = shipped(WALLED_NAME if seen.table.walled else NAME)
+    network = shipped(WALLED_NAME if seen.table.furnished else NAME)
     return affinities_of(frame.rgb, seen, network, own.colour, risen, own.margin)
 
 

@@ -39,6 +39,11 @@ class Table(Outlined):
         """Whether a bin stands on it, or a wall or a shelf shuts it off."""
         return bool(self.bins) or self.board is not None or any(w.spans for w in self.walls)
 
+    @property
+    def furnished(self) -> bool:
+        """Whether there is more than a table: walls, or platforms on it."""
+        return self.walled or bool(self.platforms)
+
     def height(self, points: NDArray[np.floating]) -> NDArray[np.float64]:
         """(...,) metres above what lies beneath points (..., 3): the table, the floor of a bin, or
         a platform."""

@@ -27,6 +27,7 @@ from brrp_cli.segmentation.learned_affinities import (
 from brrp_cli.segmentation.pixel_pairs import OFFSETS, windows
 from brrp_cli.segmentation.rising import rising_in
 from brrp_cli.segmentation.seen_surfaces import see_surfaces
+from brrp_cli.shapes import solids
 
 
 @pytest.fixture(scope="module")
@@ -160,6 +161,9 @@ BIN_FRAME = bin_scene.seen(bin_scene.standing((0.08, 0.06, 0.07), 0.05, 0.02))
 SHELF_FRAME = room_scene.photograph(
     room_scene.THINGS, room_scene.shelf(), elevation=0.25, distance=0.9
 )
+PLATFORM_FRAME = bin_scene.seen(
+    bin_scene.standing((0.08, 0.06, 0.07), 0.05, 0.02), bin=solids.box(0.4, 0.3, 0.02)
+)
 
 
 @pytest.mark.parametrize(
@@ -172,10 +176,11 @@ SHELF_FRAME = room_scene.photograph(
         ),
         (SHELF_FRAME, WALLED_NAME),
         (BIN_FRAME, WALLED_NAME),
+        (PLATFORM_FRAME, WALLED_NAME),
     ],
-    ids=["table", "wall", "shelf", "bin"],
+    ids=["table", "wall", "shelf", "bin", "platform"],
 )
-def test_the_network_that_knows_walls_is_asked_where_there_are_some(frame, name):
+def test_the_network_that_knows_walls_is_asked_where_there_is_more_than_a_table(frame, name):
     config = SegmentConfig()
     seen = see_surfaces(frame, 0, config)
     own = config.affinities
