@@ -231,6 +231,7 @@ class ReachingInConfig:
     """What reaches in over the table through the air, as an arm does.
 
     pixels : that it has at least, `cut` of them within `border` pixels of the image's border
+    over : part of it that lies over the table, at least
     lowest : percentile of its heights that counts as its lower end, which is `clear` metres or more
         above the table; hidden : part of that end that may lie within `foot` pixels of the border
     hides : part of what lies straight below it that it hides itself, from which on it may stand
@@ -242,6 +243,7 @@ class ReachingInConfig:
     pixels: int = between(500, 1, 1_000_000)
     border: int = between(4, 1, 64)
     cut: int = between(20, 1, 10_000)
+    over: float = share(0.1)
     lowest: float = between(5.0, 0.0, 100.0)
     clear: float = 0.03
     foot: int = between(15, 1, 256)

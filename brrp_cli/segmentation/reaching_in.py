@@ -39,7 +39,8 @@ def reaching_in(
     margin = _margin(labels.shape, own.foot)
     for label in _at_the_border(labels, own):
         mine = labels == label
-        if not _hangs(seen.height, mine, margin, own):
+        # What is behind the table stands elsewhere.
+        if (seen.beside[mine] <= 0).mean() < own.over or not _hangs(seen.height, mine, margin, own):
             continue
         # Of upright things, from above, the foot is hidden.
         if hidden_by_itself(mine, frame, seen.table.plane, config.left_out) < own.hides:

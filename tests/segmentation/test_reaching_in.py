@@ -93,6 +93,16 @@ def test_what_hangs_within_the_image_is_none():
     assert not found_in(photograph([*room_scene.THINGS, hanging])).any()
 
 
+def test_what_is_behind_the_table_is_none():
+    short = trimesh.creation.box((0.8, 0.8, 0.02)).apply_translation([0, 0, -0.01])
+    behind = room_scene.turned(solids.moved(solids.box(0.1, 0.3, 0.6), x=-0.8, z=0.05))
+    frame = room_scene.photograph(
+        [*room_scene.THINGS, behind], [room_scene.turned(short)], elevation=0.35, distance=0.7
+    )
+    assert frame.segmap[0].any(), "the border cuts it"
+    assert not found_in(frame).any()
+
+
 def test_before_a_wall_nothing_is_taken_for_an_arm():
     things = [*room_scene.THINGS, arm()]
     background = [room_scene.TABLE, room_scene.wall()]
