@@ -117,7 +117,7 @@ class Reconstructor:
 
     def __call__(self, frame: Frame) -> Reconstruction:
         """All objects of one frame; masks are made where it has none, which `seconds` tells, and
-        mended by what is recognised.
+        those that brrp made, now or before, are mended by what is recognised.
 
         Errors: BrrpError; FrameError if nothing stands on the table.
         """
@@ -139,9 +139,11 @@ class Reconstructor:
 
     def _reconstructed(self, frame: Frame) -> Reconstruction:
         start = time.perf_counter()
-        masked, aside = (frame, None) if frame.object_ids else self._with_masks(frame)
+        made = not frame.object_ids or frame.aside is not None
+        masked, aside = frame.with_masks(frame.segmap), frame.aside
+        if not frame.object_ids:
+            masked, aside = self._with_masks(frame)
         seconds = time.perf_counter() - start
-        made = masked is not frame
         if self._track is not None:
             result = self._tracked(masked, aside, mends=made)
         else:

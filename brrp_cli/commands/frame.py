@@ -53,7 +53,7 @@ def command(
 
     frame = source.read()
     if makes_masks:
-        frame = require_objects(source.make_masks(frame, seed)[0])
+        frame = require_objects(source.make_masks(frame, seed))
         write_picture(frame, picture)
     elif not frame.object_ids and source.masks is None:
         raise FrameError(

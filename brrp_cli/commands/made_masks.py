@@ -1,4 +1,4 @@
-"""Masks that `brrp reconstruct` makes on the way, and their picture beside the results."""
+"""Masks that brrp made, on the way or before, and their picture beside the results."""
 
 from __future__ import annotations
 
@@ -42,10 +42,9 @@ def make_masks(
 
     if source.masks is not None:
         return require_objects(frame), MadeMasks(config, None)
-    picture = output.with_name(output.name + ".masks.png")
+    picture = _picture(output)
     refuse_existing([picture], overwrite)
-    frame, aside = source.make_masks(frame, seed, config)
-    require_objects(frame)
+    frame = require_objects(source.make_masks(frame, seed, config))
     write_picture(frame, picture)
     how = f"the prompt {source.prompt!r}" if source.prompt else "what stands on the table"
     note(f"Masks: made on the way from {how}, {len(frame.object_ids)} objects: {picture}")
@@ -53,7 +52,18 @@ def make_masks(
         f"  to correct them: brrp segment {quote(str(output / 'frame.npz'))} --merge 1,2 --split 3"
         " --drop 4 -o NEW.npz"
     )
-    return frame, MadeMasks(config, aside)
+    return frame.with_masks(frame.segmap), MadeMasks(config, frame.aside)
+
+
+def masks_of(
+    frame: Frame, output: Path, config: SegmentConfig, *, overwrite: bool
+) -> tuple[Frame, MadeMasks | None]:
+    """A frame that has masks, and how they were made; None where brrp did not make them, or they
+    were corrected."""
+    if frame.aside is None:
+        return frame, None
+    refuse_existing([_picture(output)], overwrite)
+    return frame.with_masks(frame.segmap), MadeMasks(config, frame.aside)
 
 
 def tell_mended(before: Frame, after: Frame, output: Path) -> None:
@@ -64,10 +74,14 @@ def tell_mended(before: Frame, after: Frame, output: Path) -> None:
 
     if np.array_equal(before.segmap, after.segmap):
         return
-    picture = output.with_name(output.name + ".masks.png")
+    picture = _picture(output)
     write_picture(after, picture)
     pixels = int((before.segmap != after.segmap).sum())
     note(
         f"Masks: mended by recognised objects in {pixels} pixels,"
         f" {len(before.object_ids)} objects before, {len(after.object_ids)} after: {picture}"
     )
+
+
+def _picture(output: Path) -> Path:
+    return output.with_name(output.name + ".masks.png")

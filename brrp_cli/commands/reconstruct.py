@@ -13,7 +13,7 @@ import click
 from brrp_cli.commands.export import CONFIDENCE, check_libraries, export
 from brrp_cli.commands.grasp import GRIPPER_HELP, JSON, grasp
 from brrp_cli.commands.json_option import json_option, report_of
-from brrp_cli.commands.made_masks import MadeMasks, make_masks, tell_mended
+from brrp_cli.commands.made_masks import MadeMasks, make_masks, masks_of, tell_mended
 from brrp_cli.commands.many_frames import Work, check_many, frame_slice, run_many
 from brrp_cli.commands.method_options import (
     CONFIG_HELP,
@@ -221,9 +221,9 @@ def command(
     mask_config = SegmentConfig() if read is None else read.segmentation()
 
     def with_masks(frame: Frame, folder: Path) -> tuple[Frame, MadeMasks | None]:
-        if source.prompt is None and frame.object_ids:
-            return frame, None
         again = overwrite or frames is not None
+        if source.prompt is None and frame.object_ids:
+            return masks_of(frame, folder, mask_config, overwrite=again)
         return make_masks(source, frame, folder, seed, mask_config, overwrite=again)
 
     if frames is None:

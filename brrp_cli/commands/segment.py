@@ -97,7 +97,7 @@ def command(
     config = SegmentConfig() if file is None else read_config(file).segmentation()
     frame = source.read()
     if again or source.prompt is not None or not frame.object_ids:
-        frame, _ = source.make_masks(frame, seed, config)
+        frame = source.make_masks(frame, seed, config)
     before = frame
     for object_id, pieces in splits:
         frame = frame.with_masks(edit_masks.split(frame, object_id, pieces, seed, config))

@@ -14,9 +14,6 @@ from brrp_cli.errors import FrameError
 from brrp_cli.files import exists
 
 if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
     from brrp_cli.config.segmentation import SegmentConfig
     from brrp_cli.frames.format import Request
     from brrp_cli.frames.frame import Frame
@@ -180,21 +177,20 @@ class SourceOptions:
         assert self.path is not None
         return list_frames(self.path, self.request)
 
-    def make_masks(
-        self, frame: Frame, seed: int, config: SegmentConfig | None = None
-    ) -> tuple[Frame, NDArray[np.int64] | None]:
-        """The frame with masks made anew, by the prompt where there is one, else from depth;
-        and the masks (H, W) that were left out, 0 = none.
+    def make_masks(self, frame: Frame, seed: int, config: SegmentConfig | None = None) -> Frame:
+        """The frame with masks made anew, by the prompt where there is one, else from depth, and
+        those that were left out.
 
         Errors: FrameError if nothing is found; MaskError if the models cannot be used.
         """
+        import numpy as np
+
         from brrp_cli.segmentation.segment import segment_and_aside
 
         if self.prompt is None:
-            segmap, aside = segment_and_aside(frame, seed, config, keep_all=self.keep_all)
-            return frame.with_masks(segmap), aside
+            return frame.with_masks(*segment_and_aside(frame, seed, config, keep_all=self.keep_all))
         segmap = _prompt_segmenter(self.masks_dir, config)(frame, self.prompt, seed)
-        return frame.with_masks(segmap), None
+        return frame.with_masks(segmap, np.zeros_like(segmap))
 
 
 @cache

@@ -27,6 +27,8 @@ class Frame:
     K : (3, 3) float64, pinhole intrinsics, pixels
     T_world_cam : (4, 4) float64 or None, camera frame to world frame
     source : the file or folder it came from, for messages
+    aside : (H, W) int64, masks that were left out where brrp made those of `segmap`, 0 = none: what
+        is recognised mends such masks. None where masks came with the frame, or were corrected
 
     The arrays are read-only copies: nothing downstream can change what the caller handed in.
     """
@@ -37,6 +39,7 @@ class Frame:
     K: NDArray[np.float64]
     T_world_cam: NDArray[np.float64] | None = None
     source: Path | None = field(default=None, compare=False)
+    aside: NDArray[np.int64] | None = field(default=None, compare=False)
 
     def __post_init__(self) -> None:
         height, width = self.segmap.shape
@@ -45,6 +48,7 @@ class Frame:
             "points": (height, width, 3),
             "K": (3, 3),
             "T_world_cam": (4, 4),
+            "aside": (height, width),
         }.items():
             value = getattr(self, name)
             if value is not None and value.shape != shape:
@@ -55,7 +59,7 @@ class Frame:
                     found=value.shape,
                     fix="colour, depth and masks must come from one camera at one resolution",
                 )
-        for name in ("rgb", "points", "segmap", "K", "T_world_cam"):
+        for name in ("rgb", "points", "segmap", "K", "T_world_cam", "aside"):
             value = getattr(self, name)
             if value is not None:
                 value = value.copy()
@@ -97,20 +101,24 @@ class Frame:
         """Ids in the mask, ascending, without the background."""
         return [int(i) for i in np.unique(self.segmap[self.segmap != BACKGROUND])]
 
-    def with_masks(self, segmap: NDArray[np.integer]) -> Frame:
+    def with_masks(
+        self, segmap: NDArray[np.integer], aside: NDArray[np.integer] | None = None
+    ) -> Frame:
         """The same image with other masks (H, W). Unlike `dataclasses.replace` it copies nothing
         but these. Errors: FrameError for another shape."""
-        if segmap.shape != self.shape:
-            raise FrameError(
-                "The masks have another size than the frame",
-                where=self.source,
-                expected=self.shape,
-                found=segmap.shape,
-            )
-        masks = segmap.astype(np.int64)
-        masks.setflags(write=False)
         frame = copy(self)
-        object.__setattr__(frame, "segmap", masks)
+        for name, given in (("segmap", segmap), ("aside", aside)):
+            if given is not None and given.shape != self.shape:
+                raise FrameError(
+                    "The masks have another size than the frame",
+                    where=self.source,
+                    expected=self.shape,
+                    found=given.shape,
+                )
+            masks = None if given is None else given.astype(np.int64)
+            if masks is not None:
+                masks.setflags(write=False)
+            object.__setattr__(frame, name, masks)
         vars(frame).pop("object_ids", None)
         return frame
 

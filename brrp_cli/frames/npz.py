@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from brrp_cli.errors import FrameError
 from brrp_cli.files import atomic_path
@@ -13,15 +15,16 @@ from brrp_cli.frames.build import make_frame, require_objects
 from brrp_cli.frames.frame import Frame
 from brrp_cli.geometry import backproject
 
-ACCEPTED = frozenset({"rgb", "depth", "K", "xyz", "segmap", "seg", "T_world_cam"})
-_NEEDED = "depth and K, or xyz; segmap or seg; optional: rgb, T_world_cam"
+ACCEPTED = frozenset({"rgb", "depth", "K", "xyz", "segmap", "seg", "T_world_cam", "left_out"})
+_NEEDED = "depth and K, or xyz; segmap or seg; optional: rgb, T_world_cam, left_out"
 
 
 def load_frame(path: str | Path, *, depth_scale: float | None = None, masks: bool = True) -> Frame:
     """Read a frame file.
 
     Keys: `depth` (H, W) and `K` (3, 3), or `xyz` (H, W, 3); `segmap` or `seg` (H, W); `rgb`
-    (H, W, 3) uint8 and `T_world_cam` (4, 4) where known. Units and checks as in `make_frame`.
+    (H, W, 3) uint8 and `T_world_cam` (4, 4) where known; `left_out` (H, W) for `Frame.aside`. Units
+    and checks as in `make_frame`.
     Pickles are never loaded.
 
     depth_scale : raw depth x depth_scale = metres
@@ -58,7 +61,22 @@ def load_frame(path: str | Path, *, depth_scale: float | None = None, masks: boo
         depth_scale=depth_scale,
         source=path,
     )
+    if "left_out" in arrays and has_masks:
+        frame = frame.with_masks(frame.segmap, _left_out(arrays["left_out"], frame))
     return require_objects(frame) if masks else frame
+
+
+def _left_out(masks: NDArray[Any], frame: Frame) -> NDArray[np.integer]:
+    """Errors: FrameError if `left_out` is none of the frame."""
+    if masks.shape != frame.shape or not np.issubdtype(masks.dtype, np.integer):
+        raise FrameError(
+            "The frame's left_out holds no masks",
+            where=frame.source,
+            expected=f"integers, {frame.shape}",
+            found=f"{masks.dtype}, {masks.shape}",
+            fix="leave it out, or make the masks again: `brrp segment FRAME.npz --again`",
+        )
+    return masks
 
 
 def save_frame(frame: Frame, path: str | Path) -> None:
@@ -76,5 +94,7 @@ def save_frame(frame: Frame, path: str | Path) -> None:
         arrays["xyz"] = frame.points
     if frame.T_world_cam is not None:
         arrays["T_world_cam"] = frame.T_world_cam
+    if frame.aside is not None:
+        arrays["left_out"] = frame.aside
     with atomic_path(Path(path)) as partial, partial.open("wb") as stream:
         np.savez_compressed(stream, **arrays)  # type: ignore[arg-type]

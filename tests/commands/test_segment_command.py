@@ -47,6 +47,19 @@ def test_masks_are_corrected_by_id(saved, tmp_path):
     assert (tmp_path / "g.masks.png").is_file()
 
 
+def test_made_masks_are_known_as_such_until_they_are_corrected(saved, tmp_path):
+    path, _ = saved
+    for arguments, made in (
+        ((path, "-o", tmp_path / "kept.npz"), False),
+        ((path, "--again", "-o", tmp_path / "made.npz"), True),
+        ((tmp_path / "made.npz", "-o", tmp_path / "same.npz"), True),
+        ((tmp_path / "made.npz", "--drop", "1", "-o", tmp_path / "fixed.npz"), False),
+    ):
+        result = run(*arguments)
+        assert result.exit_code == 0, result.output
+        assert (load_frame(arguments[-1]).aside is not None) is made, arguments
+
+
 def test_one_mask_over_two_things_is_split_where_they_meet(saved, tmp_path):
     path, frame = saved
     run(path, "--merge", "4,7", "-o", tmp_path / "g.npz")

@@ -65,6 +65,26 @@ def test_the_same_frame_is_the_same_bytes(tmp_path):
     assert (tmp_path / "a.npz").read_bytes() == (tmp_path / "b.npz").read_bytes()
 
 
+def test_masks_that_were_left_out_come_back_until_masks_are_corrected(tmp_path):
+    aside = np.zeros_like(MASK)
+    aside[5, :3] = 2
+    frame = make_frame(rgb=RGB, segmap=MASK, depth=DEPTH, K=K).with_masks(MASK, aside)
+    save_frame(frame, tmp_path / "a.npz")
+    found = load_frame(tmp_path / "a.npz")
+    assert same(found, frame) and np.array_equal(found.aside, aside)
+    assert not found.aside.flags.writeable
+    corrected = found.with_masks(found.segmap)
+    save_frame(corrected, tmp_path / "b.npz")
+    assert corrected.aside is None and load_frame(tmp_path / "b.npz").aside is None
+
+
+@pytest.mark.parametrize("wrong", [MASK[1:], MASK + 0.5, np.zeros((6, 8, 2), int)])
+def test_masks_that_were_left_out_are_checked(tmp_path, wrong):
+    np.savez(tmp_path / "f.npz", depth=DEPTH, K=K, segmap=MASK, left_out=wrong)
+    with pytest.raises(FrameError, match="left_out"):
+        load_frame(tmp_path / "f.npz")
+
+
 def test_contact_graspnets_other_names_are_read(tmp_path):
     path = tmp_path / "frame.npz"
     np.savez(path, depth=(DEPTH * 1000).astype(np.uint16), K=K, seg=MASK)

@@ -7,16 +7,19 @@ from functools import partial
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 from painted_scene import STRANGE, THINGS, photograph, write_things
 from scipy.ndimage import binary_dilation
 
 from brrp_cli import Reconstructor
 from brrp_cli.api import reconstruct, try_masks
+from brrp_cli.cli import main
 from brrp_cli.config import preset
 from brrp_cli.config.mending import RegroupConfig
 from brrp_cli.config.registration import TrialConfig
 from brrp_cli.config.segmentation import SegmentConfig
 from brrp_cli.errors import BrrpError
+from brrp_cli.frames.npz import load_frame, save_frame
 from brrp_cli.mending.again import Again
 from brrp_cli.mending.chosen import chosen
 from brrp_cli.mending.mend import mend
@@ -252,3 +255,22 @@ def test_a_session_regroups_the_masks_that_it_makes(prior, truth):
     result = again(frame)
     assert {"red_box", "red_can", "yellow_ball"} <= set(taken_for(result).values())
     assert taken_for(again(frame)) == taken_for(result)
+
+
+def test_masks_that_were_made_before_are_mended_by_session_and_command(
+    prior, frame, aside, mended, tmp_path
+):
+    made, kept = frame.with_masks(frame.segmap, aside), frame
+    session = Reconstructor(prior, retriever="appearance", workers=1)
+    assert np.array_equal(session(made).frame.segmap, mended.frame.segmap)
+    assert np.array_equal(session(kept).frame.segmap, frame.segmap)
+    for name, each, after in (("made", made, mended.frame), ("kept", kept, frame)):
+        save_frame(each, tmp_path / f"{name}.npz")
+        options = ["--prior", prior.path, "--retriever", "appearance", "-o", tmp_path / name]
+        run = ["reconstruct", tmp_path / f"{name}.npz", *options]
+        result = CliRunner().invoke(main, list(map(str, run)))
+        assert result.exit_code == 0, result.output
+        stored = load_frame(tmp_path / name / "frame.npz")
+        assert np.array_equal(stored.segmap, after.segmap), name
+        assert stored.aside is None, "what was mended is given from then on"
+        assert (tmp_path / f"{name}.masks.png").exists() == (name == "made")
