@@ -24,8 +24,7 @@ def load_frame(path: str | Path, *, depth_scale: float | None = None, masks: boo
 
     Keys: `depth` (H, W) and `K` (3, 3), or `xyz` (H, W, 3); `segmap` or `seg` (H, W); `rgb`
     (H, W, 3) uint8 and `T_world_cam` (4, 4) where known; `left_out` (H, W) for `Frame.aside`. Units
-    and checks as in `make_frame`.
-    Pickles are never loaded.
+    and checks as in `make_frame`. Pickles are never loaded.
 
     depth_scale : raw depth x depth_scale = metres
     masks : whether the file must have masks with an object in them

@@ -19,7 +19,6 @@ from brrp_cli.dependencies import import_library
 CUT = "cut by the image's border"
 IN_THE_AIR = "off the support surface"
 EDGE = "smeared over the table's edge"
-REACHES_IN = "reaching in through the air"  # reaching_in.py
 
 
 def left_out(
@@ -80,10 +79,7 @@ def border_share(mask: NDArray[np.bool_]) -> float:
 
 def told(reasons: Mapping[int, str]) -> str:
     """How many masks were left out and why, in words."""
-    kinds = [
-        (reason, list(reasons.values()).count(reason))
-        for reason in (REACHES_IN, CUT, IN_THE_AIR, EDGE)
-    ]
+    kinds = [(reason, list(reasons.values()).count(reason)) for reason in (CUT, IN_THE_AIR, EDGE)]
     return ", ".join(f"{count} {reason}" for reason, count in kinds if count)
 
 

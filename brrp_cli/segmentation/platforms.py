@@ -149,6 +149,8 @@ def _is_one(cells: PlanCells, region: Cells, top: float, config: PlatformsConfig
 
 def _is_walled(cells: PlanCells, edge: Cells, high: Cells, config: PlatformsConfig) -> bool:
     """Whether an edge rises on most sides, as that of a tray does: things lie over it on a few."""
+    if not edge.any():
+        return False
     middles = cells.middles.reshape(*edge.shape, 2)[edge]
     x, y = (middles - middles.mean(axis=0)).T
     side = (

@@ -20,7 +20,7 @@ from brrp_cli.segmentation.beneath import hides_its_foot
 from brrp_cli.segmentation.components import absorb_small
 from brrp_cli.segmentation.fill_concavities import fill_inside
 from brrp_cli.segmentation.join_insides import join_insides
-from brrp_cli.segmentation.left_out import CUT, IN_THE_AIR, REACHES_IN, left_out, told
+from brrp_cli.segmentation.left_out import CUT, IN_THE_AIR, left_out, told
 from brrp_cli.segmentation.part_objects import Parted, part_objects
 from brrp_cli.segmentation.reaching_in import reaching_in
 from brrp_cli.segmentation.refine_borders import refine_borders
@@ -149,23 +149,24 @@ def _without(
     reasons = {
         i: reason
         for i, reason in found.items()
-        if reason != IN_THE_AIR
-        or not hides_its_foot(segmap == i, frame, table.plane, over, config.left_out)
+        if i <= known
+        and (
+            reason != IN_THE_AIR
+            or not hides_its_foot(segmap == i, frame, table.plane, over, config.left_out)
+        )
     }
-    reasons |= dict.fromkeys(np.unique(segmap[segmap > known]).tolist(), REACHES_IN)
     if reasons:
         log.info("Masks left out, unless recognised: %s (--all keeps them)", told(reasons))
-    out = np.isin(segmap, list(reasons))
+    arms = np.unique(segmap[segmap > known]).tolist()
+    if arms:
+        log.info("Masks left out, of what reaches in as arms do: %d (--all keeps them)", len(arms))
+    out = np.isin(segmap, [*reasons, *arms])
     # Of what shows a corner of itself alone, many stored objects could tell the rest.
     shown = np.bincount(segmap[frame.valid], minlength=int(segmap.max()) + 1)
-    never = [
-        i
-        for i, why in reasons.items()
-        if why == REACHES_IN or (why == CUT and shown[i] < config.left_out.tell)
-    ]
+    corners = [i for i, why in reasons.items() if why == CUT and shown[i] < config.left_out.tell]
     return (
         np.where(out, BACKGROUND, segmap),
-        np.where(out & ~np.isin(segmap, never), segmap, BACKGROUND),
+        np.where(out & ~np.isin(segmap, [*corners, *arms]), segmap, BACKGROUND),
     )
 
 
