@@ -6,10 +6,13 @@ is x right, y down, z forward (ROS optical frame); pixel (u, v) is column u, row
 
 from __future__ import annotations
 
+from typing import TypeVar
+
 import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.floating]
+Number = TypeVar("Number", bound=np.generic)
 # Cells of a grid for each point, up to which they are counted.
 _COUNTED = 4
 
@@ -55,14 +58,33 @@ def cells_of(points: NDArray[np.floating], cell: float) -> NDArray[np.int64]:
     if not len(points):
         return np.empty(0, np.int64)
     cells = np.floor(points / cell).astype(np.int64)
-    cells -= cells.min(axis=0)
-    size = cells.max(axis=0) + 1
+    first, last = bounds(cells)
+    cells -= first
+    size = last - first + 1
     index = np.ravel_multi_index(tuple(cells.T), tuple(size))
     if np.prod(size, dtype=np.float64) > _COUNTED * len(points):
         return np.unique(index, return_inverse=True)[1].reshape(-1)
     # Counted rather than sorted, in a quarter of the time.
     held = np.bincount(index) > 0
     return (np.cumsum(held) - 1)[index]
+
+
+def bounds(points: NDArray[Number]) -> tuple[NDArray[Number], NDArray[Number]]:
+    """The least and the greatest (d,) of each coordinate of points (n, d)."""
+    # By column: NumPy takes rows of two or three numbers one at a time, fifteen times as slow.
+    columns = points.T
+    least, most = ([reduce(each) for each in columns] for reduce in (np.min, np.max))
+    return np.array(least, points.dtype), np.array(most, points.dtype)
+
+
+def within(
+    points: NDArray[np.number], least: NDArray[np.number], most: NDArray[np.number]
+) -> NDArray[np.bool_]:
+    """(n,) whether each coordinate of points (n, d) is at least (d,) and at most (d,)."""
+    inside = np.ones(len(points), dtype=bool)
+    for column, low, high in zip(points.T, least, most, strict=True):
+        inside &= (column >= low) & (column <= high)
+    return inside
 
 
 def backproject(depth: Array, K: Array) -> NDArray[np.float32]:

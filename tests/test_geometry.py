@@ -1,7 +1,17 @@
 import numpy as np
+import pytest
 from scipy.spatial.transform import Rotation
 
-from brrp_cli.geometry import backproject, normalise, project, similarity, transform_points
+from brrp_cli.geometry import (
+    backproject,
+    bounds,
+    cells_of,
+    normalise,
+    project,
+    similarity,
+    transform_points,
+    within,
+)
 
 K = np.array([[600.0, 0, 315.5], [0, 610.0, 243.25], [0, 0, 1]])
 
@@ -65,3 +75,24 @@ def test_the_default_similarity_is_the_identity() -> None:
 
 def test_normalise_gives_unit_vectors_and_keeps_zeros() -> None:
     assert np.allclose(normalise(np.array([[3.0, 0, 4], [0, 0, 0]])), [[0.6, 0, 0.8], [0, 0, 0]])
+
+
+def test_bounds_are_the_least_and_the_greatest_of_each_coordinate() -> None:
+    points = np.array([[1.0, -2.0, 0.5], [3.0, 4.0, 0.5], [2.0, 0.0, -1.0]], np.float32)
+    least, most = bounds(points)
+    assert least.dtype == most.dtype == np.float32
+    assert least.tolist() == [1.0, -2.0, -1.0] and most.tolist() == [3.0, 4.0, 0.5]
+    assert within(points, np.array([1.0, -2.0, -1.0]), np.array([2.0, 4.0, 1.0])).tolist() == [
+        True,
+        False,
+        True,
+    ]
+    assert not within(np.full((1, 2), np.nan), np.zeros(2), np.ones(2)).any()
+
+
+@pytest.mark.parametrize("cell", [0.5, 1e-4])  # counted, and sorted
+def test_points_of_one_cell_have_one_number(cell: float) -> None:
+    points = np.random.default_rng(0).uniform(-2, 2, (200, 2))
+    cells = [tuple(each) for each in np.floor(points / cell).astype(int).tolist()]
+    numbers = {each: number for number, each in enumerate(sorted(set(cells)))}
+    assert cells_of(points, cell).tolist() == [numbers[each] for each in cells]

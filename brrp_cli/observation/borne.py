@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brrp_cli.config.observation import ObservationConfig, SupportConfig
-from brrp_cli.geometry import IMAGE_UP, lengths
+from brrp_cli.geometry import IMAGE_UP, cells_of, lengths
 from brrp_cli.observation.patches import Patch, Ransac, largest_planes, patch_with_hidden
 from brrp_cli.observation.support_plane import Plane, fit_plane
 from brrp_cli.seeds import child_rng, child_seed
@@ -155,9 +155,9 @@ def standing_on(patch: Patch, things: Points, config: SupportConfig) -> tuple[in
     above[above] = patch.holds(patch.plan(things[above]), config.off)
     if not above.any():
         return 0, 0
-    cells = np.floor(patch.plan(things[above]) / config.cell).astype(np.int64)
-    _, number, count = np.unique(cells, axis=0, return_inverse=True, return_counts=True)
+    number = cells_of(patch.plan(things[above]), config.cell)
+    count = np.bincount(number)
     lowest = np.full(len(count), np.inf)
-    np.minimum.at(lowest, number.ravel(), height[above])
+    np.minimum.at(lowest, number, height[above])
     stands = lowest < config.low
     return int(stands.sum()), int(count[stands].sum())

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from brrp_cli.config.observation import SupportConfig
 from brrp_cli.dependencies import import_library
+from brrp_cli.geometry import bounds
 from brrp_cli.hulls import convex_hull
 from brrp_cli.observation.outlined import Outlined
 from brrp_cli.observation.support_plane import Plane, largest_plane
@@ -104,8 +105,8 @@ def _patch(
     if hull is None:
         return None
     # The ends of it in each of its directions, which are many enough.
-    ends = on @ hull[:, :2].T
-    across = float((ends.max(axis=0) - ends.min(axis=0)).max())
+    least, most = bounds(on @ hull[:, :2].T)
+    across = float((most - least).max())
     return Patch(plane, axes, hull, count, across)
 
 
@@ -157,8 +158,9 @@ def _hanging_together(plan: NDArray[np.float64], cell: float) -> list[NDArray[np
     edge is no table."""
     ndimage = import_library("scipy.ndimage")
     cells = np.floor(plan / cell).astype(np.int64)
-    cells -= cells.min(axis=0)
-    grid = np.zeros(cells.max(axis=0) + 1, dtype=bool)
+    first, last = bounds(cells)
+    cells -= first
+    grid = np.zeros(last - first + 1, dtype=bool)
     grid[tuple(cells.T)] = True
     # Objects hide parts of the table behind them: patches up to 8 cm apart are one.
     joined, _ = ndimage.label(ndimage.binary_dilation(grid, iterations=2))

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from brrp_cli.config import SensorConfig
 from brrp_cli.frames.frame import BACKGROUND, Frame
-from brrp_cli.geometry import lengths
+from brrp_cli.geometry import bounds, lengths
 from brrp_cli.observation.sensor_noise import MEDIAN_ABSOLUTE, depth_deviation
 from brrp_cli.observation.support_plane import Plane, plane_frame
 
@@ -108,8 +108,9 @@ def _table_waves(
     cells = np.floor(points @ plane_frame(plane)[:2, :3].T / config.patch).astype(np.int64)
     if len(cells) < config.patch_points:
         return None
-    cells -= cells.min(axis=0)
-    side = cells.max(axis=0) + 1
+    first, last = bounds(cells)
+    cells -= first
+    side = last - first + 1
     number = cells[:, 0] * side[1] + cells[:, 1]
     count = np.bincount(number, minlength=side.prod()).reshape(side)
     total = np.bincount(number, height / np.maximum(along, 0.1), side.prod()).reshape(side)

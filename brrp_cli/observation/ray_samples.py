@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from brrp_cli.config import ObservationConfig
 from brrp_cli.frames.frame import BACKGROUND, Frame
 from brrp_cli.frames.last_frame import kept_for_last_frame
+from brrp_cli.geometry import bounds
 from brrp_cli.observation.borne import supporting_plane
 from brrp_cli.observation.subsample import grid_subsample
 from brrp_cli.observation.support_plane import Plane, floor_beneath
@@ -216,7 +217,8 @@ def below_samples(
 
 def box_center(points: NDArray[np.float32]) -> NDArray[np.float64]:
     """Middle (3,) of the bounding box of points (n, 3)."""
-    return (points.min(axis=0).astype(np.float64) + points.max(axis=0)) / 2
+    least, most = bounds(points)
+    return (least.astype(np.float64) + most) / 2
 
 
 def _near_any(

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from brrp_cli.config import FloorConfig, ObservationConfig
 from brrp_cli.dependencies import import_library, import_open3d, seeded_open3d
-from brrp_cli.geometry import lengths, normalise, similarity
+from brrp_cli.geometry import bounds, lengths, normalise, similarity, within
 from brrp_cli.seeds import child_seed
 
 
@@ -99,12 +99,13 @@ def floor_beneath(
         np.floor((points @ T[:2, :3].T) / config.cell).astype(np.int64)
         for points in (near, objects)
     )
-    corner = on.min(axis=0) - config.reach
-    held = np.zeros(on.max(axis=0) - corner + config.reach + 1, dtype=bool)
+    first, last = bounds(on)
+    corner = first - config.reach
+    held = np.zeros(last - corner + config.reach + 1, dtype=bool)
     held[tuple((on - corner).T)] = True
     beside = import_library("scipy.ndimage").binary_dilation(held, iterations=config.reach)
     index = around - corner
-    there = ((index >= 0) & (index < held.shape)).all(axis=1)
+    there = within(index, np.zeros(2), np.array(held.shape) - 1)
     there[there] = beside[tuple(index[there].T)]
     height = plane.signed_distance(near[there])
     if len(height) < config.least_points:

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brrp_cli.config.segmentation import ConcaveEdgesConfig
+from brrp_cli.segmentation.crease_loops import hollow_cosines
 
 Array = NDArray[np.floating]
 
@@ -49,28 +50,18 @@ def hollow_angles(points: Array, normals: Array, config: ConcaveEdgesConfig) -> 
 
     normals : (H, W, 3) unit, toward the camera
     """
-    height, width = points.shape[:2]
     reach = config.reach
-    pad = ((0, 0), (reach, reach), (reach, reach))
-    # The axis comes first: long contiguous rows are what NumPy is fast on.
-    all_points = np.pad(np.moveaxis(points, -1, 0), pad, constant_values=np.nan)
-    all_normals = np.pad(np.moveaxis(normals, -1, 0), pad, constant_values=np.nan)
-    least = np.ones((height, width))
-    for down, right in ((0, reach), (reach, 0), (3, 3), (3, -3)):
-        sides = []
-        for sign in (1, -1):
-            row, column = reach + sign * down, reach + sign * right
-            window = np.s_[:, row : row + height, column : column + width]
-            sides.append((all_points[window], all_normals[window]))
-        (first, first_normal), (second, second_normal) = sides
-        between = first - second
-        with np.errstate(invalid="ignore"):
-            cosine = _sum_of_products(first_normal, second_normal)
-            hollow = _sum_of_products(first_normal - second_normal, between) < 0
-            near = _sum_of_products(between, between) < config.near**2
-            found = hollow & near & (cosine < least)
-        least[found] = cosine[found]
-    return np.degrees(np.arccos(np.clip(least, -1, 1)))
+    ways = np.array([(0, reach), (reach, 0), (3, 3), (3, -3)])
+    least = hollow_cosines(
+        np.ascontiguousarray(points, np.float32),
+        np.ascontiguousarray(normals, np.float32),
+        ways,
+        config.near,
+    )
+    angles = np.zeros(least.shape)
+    bends = least < 1
+    angles[bends] = np.degrees(np.arccos(np.clip(least[bends].astype(np.float64), -1, 1)))
+    return angles
 
 
 def _dot(first: Array, second: Array) -> Array:

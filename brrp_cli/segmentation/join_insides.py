@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from brrp_cli.config.segmentation import FootprintsConfig
 from brrp_cli.dependencies import import_library
+from brrp_cli.geometry import within
 from brrp_cli.hulls import convex_hull, in_hull
 from brrp_cli.segmentation.components import relabel
 
@@ -75,7 +76,7 @@ def _standing(
     # Bled pixels lie far behind, and would be most of the hull.
     low, high = np.percentile(plan[mask], (config.bled, 100 - config.bled), axis=0)
     points = plan[mask]
-    most = ((points >= low) & (points <= high)).all(axis=-1)
+    most = within(points, low, high)
     points = points[most] if most.any() else points
     cells = _filled(_places(np.unique(_codes(np.floor(points / config.cell).astype(np.int64)))))
     known = mask & np.isfinite(normals[..., 0])

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brrp_cli.config.table import BinsConfig
+from brrp_cli.geometry import bounds
 from brrp_cli.hulls import convex_hull, in_hull
 
 Cells = NDArray[np.bool_]
@@ -57,10 +58,13 @@ def plan_cells(
     plan, height = plan[some], height[some]
     known = np.abs(height) < config.most_height
     points = np.asarray(plan[known], np.float64)
-    if not known.any() or np.ptp(points, axis=0).max() > config.widest:
+    if not known.any():
         return None
-    origin = points.min(axis=0)
-    index = ((points - origin) / config.cell).astype(np.int64)
-    tops = np.full(index.max(axis=0) + 1, -np.inf)
-    np.maximum.at(tops, (index[:, 0], index[:, 1]), height[known])
+    origin, last = bounds(points)
+    if (last - origin).max() > config.widest:
+        return None
+    rows, columns = ((points - origin) / config.cell).astype(np.int64).T
+    tops = np.full((rows.max() + 1, columns.max() + 1), -np.inf)
+    # NumPy is fast at this with one index alone.
+    np.maximum.at(tops.reshape(-1), rows * tops.shape[1] + columns, height[known])
     return PlanCells(tops, origin, config.cell)

@@ -37,18 +37,19 @@ def fill_holes(labels: NDArray[np.int64], missing: NDArray[np.bool_]) -> NDArray
     """
     ndimage = import_library("scipy.ndimage")
     holes, count = ndimage.label(missing & (labels == 0))
-    beside = []
+    beside, many = [], int(labels.max()) + 1
     for axis in (0, 1):
         hole, label = np.moveaxis(holes, axis, 0), np.moveaxis(labels, axis, 0)
         for near, far in ((np.s_[1:], np.s_[:-1]), (np.s_[:-1], np.s_[1:])):
             ring = (hole[near] > 0) & (hole[far] == 0)
-            beside.append(np.stack([hole[near][ring], label[far][ring]], axis=-1))
+            beside.append(hole[near][ring] * many + label[far][ring])
     # The image's border is like a label of its own, and so is the background.
     for edge in (holes[0], holes[-1], holes[:, 0], holes[:, -1]):
-        beside.append(np.stack([edge, np.zeros_like(edge)], axis=-1))
-    pairs = np.unique(np.concatenate(beside), axis=0)
-    labels_beside = np.bincount(pairs[:, 0], minlength=count + 1)
+        beside.append(edge.astype(np.int64) * many)
+    # Each pair of a hole and a label beside it, once.
+    hole, label = np.divmod(np.unique(np.concatenate(beside)), many)
+    labels_beside = np.bincount(hole, minlength=count + 1)
     fill = np.zeros(count + 1, dtype=np.int64)
-    alone = (labels_beside[pairs[:, 0]] == 1) & (pairs[:, 0] > 0)
-    fill[pairs[alone, 0]] = pairs[alone, 1]
+    alone = (labels_beside[hole] == 1) & (hole > 0)
+    fill[hole[alone]] = label[alone]
     return np.where(holes > 0, fill[holes], labels)

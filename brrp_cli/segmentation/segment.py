@@ -69,6 +69,7 @@ def segment_and_aside(
     config = config or SegmentConfig()
     seen = see_surfaces(frame, seed, config)
     points, table = seen.points, seen.table
+    area = _areas(frame)
     rises = rising_in(frame, seen, config)
     parted = part_objects(frame, seen, rises.risen, config)
     away = reaching_in(frame, seen, rises.lift, config)
@@ -76,14 +77,14 @@ def segment_and_aside(
     rises = rises.without(away)
     objects = join_insides(labels, seen.plan, seen.height, table.plan(seen.normals), config.insides)
     objects = split_stacks(objects, frame.rgb, seen.height, config.stacks)
-    segmap = absorb_small(objects, parted.border, ~_are_large(objects, frame, parted, config))
+    segmap = absorb_small(objects, parted.border, ~_are_large(objects, area, parted, config))
     # Pixels at edges, which were left out of the smoothed depth, join what they lie next to.
     edges = frame.valid & ~seen.valid
     edges &= _may_rise(frame, table, rises.lift, config) & ~away
     points = np.where(edges[..., None], frame.points, points)
     segmap = grow(segmap, points, rises.rim | edges, config.reach)
     # Specks would grow with their borders.
-    segmap = _large(segmap, frame, parted, config)
+    segmap = _large(segmap, area, parted, config)
     # What the network takes for table stays table, whatever stands around it.
     floors = rises.floor & (parted.object > config.concavities.object)
     filled = fill_inside(segmap, table.plan(points), floors, config.concavities)
@@ -91,7 +92,7 @@ def segment_and_aside(
     # Back to where it is: a border with it is none with the table.
     filled = np.where((filled == BACKGROUND) & (reaching > 0), reaching + known, filled)
     segmap = refine_borders(filled, frame.rgb, changed, config.borders)
-    segmap = _large(fill_holes(segmap, ~frame.valid), frame, parted, config)
+    segmap = _large(fill_holes(segmap, ~frame.valid), area, parted, config)
     aside = np.zeros_like(segmap)
     if not keep_all:
         segmap, aside = _without(segmap, known, frame, table, config)
@@ -170,10 +171,10 @@ def _without(
     )
 
 
-def _areas(segmap: NDArray[np.int64], frame: Frame) -> NDArray[np.float64]:
-    """(n + 1,) what each label shows of itself, metres squared, as if seen face on."""
-    area = np.nan_to_num(frame.points[..., 2] ** 2) / (frame.K[0, 0] * frame.K[1, 1])
-    return np.asarray(np.bincount(segmap.ravel(), weights=area.ravel()), dtype=np.float64)
+def _areas(frame: Frame) -> NDArray[np.float64]:
+    """(H, W) what each pixel shows, metres squared, as if seen face on; 0 without depth."""
+    focal = frame.K[0, 0] * frame.K[1, 1]
+    return np.asarray(np.nan_to_num(frame.points[..., 2] ** 2) / focal, dtype=np.float64)
 
 
 def _sure(segmap: NDArray[np.int64], parted: Parted, config: SegmentConfig) -> NDArray[np.bool_]:
@@ -183,30 +184,30 @@ def _sure(segmap: NDArray[np.int64], parted: Parted, config: SegmentConfig) -> N
 
 
 def _are_large(
-    segmap: NDArray[np.int64], frame: Frame, parted: Parted, config: SegmentConfig
+    segmap: NDArray[np.int64], area: NDArray[np.float64], parted: Parted, config: SegmentConfig
 ) -> NDArray[np.bool_]:
     """(n + 1,) whether each label shows so much of itself that it is no speck."""
     least = config.min_area * np.where(_sure(segmap, parted, config), config.sure_part, 1.0)
-    return np.asarray(_areas(segmap, frame) >= least)
+    return np.asarray(np.bincount(segmap.ravel(), area.ravel()) >= least)
 
 
 def _large(
-    segmap: NDArray[np.int64], frame: Frame, parted: Parted, config: SegmentConfig
+    segmap: NDArray[np.int64], area: NDArray[np.float64], parted: Parted, config: SegmentConfig
 ) -> NDArray[np.int64]:
     """The masks that are no specks."""
-    large = _are_large(segmap, frame, parted, config)
+    large = _are_large(segmap, area, parted, config)
     return np.where(large[segmap], segmap, BACKGROUND)
 
 
 def _numbered(segmap: NDArray[np.int64], frame: Frame, config: SegmentConfig) -> NDArray[np.int64]:
     """The masks numbered by the column of their middle. Errors: FrameError without any."""
-    columns = np.broadcast_to(np.arange(frame.shape[1]), frame.shape)
-    middles = {
-        int(i): float(columns[segmap == i].mean()) for i in np.unique(segmap) if i != BACKGROUND
-    }
-    if not middles:
+    rows, columns = np.nonzero(segmap)
+    labels = segmap[rows, columns]
+    pixels = np.bincount(labels)
+    there = np.flatnonzero(pixels)
+    if not len(there):
         raise nothing_stands(frame, f"none that shows {config.min_area * 1e4:g} cm^2 of itself")
-    numbered = np.zeros_like(segmap)
-    for number, old in enumerate(sorted(middles, key=lambda i: middles[i]), start=1):
-        numbered[segmap == old] = number
-    return numbered
+    middles = np.bincount(labels, columns)[there] / pixels[there]
+    numbers = np.zeros_like(pixels)
+    numbers[there[np.argsort(middles, kind="stable")]] = np.arange(1, len(there) + 1)
+    return np.asarray(numbers[segmap], dtype=np.int64)

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from brrp_cli.config.table import BareConfig
 from brrp_cli.dependencies import import_library
-from brrp_cli.geometry import backproject
+from brrp_cli.geometry import backproject, within
 from brrp_cli.hulls import convex_hull, in_hull
 from brrp_cli.segmentation.concave_edges import depth_steps
 from brrp_cli.segmentation.table_plane import Table
@@ -86,10 +86,10 @@ def _things(rises: Mask, seen: Seen, config: BareConfig) -> list[NDArray[np.floa
         if mine.sum() < config.pixels:
             continue
         plan = seen.plan[window][mine]
-        within = (seen.beside[window][mine] <= 0).mean()
+        inside = (seen.beside[window][mine] <= 0).mean()
         lowest = np.percentile(seen.height[window][mine], config.lowest)
-        if within > config.partly or lowest < config.foot:
+        if inside > config.partly or lowest < config.foot:
             # Bled pixels lie far behind.
             low, high = np.percentile(plan, (config.bled, 100 - config.bled), axis=0)
-            things.append((-within, plan[((plan >= low) & (plan <= high)).all(axis=-1)]))
+            things.append((-inside, plan[within(plan, low, high)]))
     return [plan for _, plan in sorted(things, key=lambda pair: pair[0])]
