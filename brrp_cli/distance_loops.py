@@ -239,13 +239,30 @@ def explained(
         _far_off(flat, values.shape, np.float32(spacing), np.float32(metres), grid, points, off)
         like, unlike = 0.0, 0.0
         for n in range(len(off)):
-            # See `geometry.bell`; beyond, it is next to nothing, and takes its time.
-            if off[n] < 6 * near:
-                like += math.exp(-0.5 * (off[n] / near) ** 2)
+            like += _bell(off[n] / np.float32(near))
         for n in range(len(off)):
             unlike += min(off[n], np.float32(far))
         found[b] = (like - distance * unlike / far) / len(off)
     return found
+
+
+@inlined
+def _bell(ratio: Single) -> Single:
+    """exp(-ratio^2 / 2) to within 2e-7, without a call: exp(-u) is the 64th power of exp(-u / 64),
+    of which five terms of the series are enough."""
+    # Where it ends, the bell is 4e-9.
+    u = min(ratio * ratio * np.float32(0.5 / 64), np.float32(0.3))
+    bell = ONE - u * np.float32(1 / 5)
+    bell = ONE - u * np.float32(1 / 4) * bell
+    bell = ONE - u * np.float32(1 / 3) * bell
+    bell = ONE - u * np.float32(1 / 2) * bell
+    bell = ONE - u * bell
+    bell *= bell
+    bell *= bell
+    bell *= bell
+    bell *= bell
+    bell *= bell
+    return bell * bell
 
 
 @inlined
