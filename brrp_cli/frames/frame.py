@@ -81,7 +81,8 @@ class Frame:
     @cached_property
     def valid(self) -> NDArray[np.bool_]:
         """(H, W) bool: pixels with a depth return."""
-        return np.isfinite(self.points).all(axis=-1) & (self.points[..., 2] > 0)
+        x, y, z = np.isfinite(np.moveaxis(self.points, -1, 0))
+        return x & y & z & (self.points[..., 2] > 0)
 
     @cached_property
     def coloured(self) -> bool:
