@@ -41,9 +41,10 @@ def surfaces_fitted(
             plane[:] = 0.0
             reach = 3.0 * gate
             for radius in radii:
-                moments[:] = 0.0
-                right[:] = 0.0
-                n = square = noise = 0.0
+                # Numbers of their own, not in an array: only those are kept in registers.
+                n = m1 = m2 = m3 = m4 = m5 = m6 = m7 = m8 = m9 = 0.0
+                m10 = m11 = m12 = m13 = m14 = square = noise = 0.0
+                r0 = r1 = r2 = r3 = r4 = r5 = 0.0
                 for y in range(max(row - radius, 0), min(row + radius + 1, height)):
                     v = (y - row) / radius
                     for x in range(max(column - radius, 0), min(column + radius + 1, width)):
@@ -53,21 +54,31 @@ def surfaces_fitted(
                         d = inverse[y, x] - own
                         if np.isnan(d):
                             continue
-                        terms[0], terms[1], terms[2] = 1.0, u, v
-                        terms[3], terms[4], terms[5] = u * u, u * v, v * v
                         s = deviation[y, x]
                         off = d - plane[0] - plane[1] * (x - column) - plane[2] * (y - row)
                         if abs(off) > reach * s:
                             continue
-                        for i in range(6):
-                            for j in range(i + 1):
-                                moments[i, j] += terms[i] * terms[j]
-                            right[i] += terms[i] * d
-                        n += 1.0
+                        uu, uv, vv = u * u, u * v, v * v
+                        n, m1, m2, m3, m4, m5 = n + 1.0, m1 + u, m2 + v, m3 + uu, m4 + uv, m5 + vv
+                        m6, m7, m8, m9 = m6 + uu * u, m7 + uu * v, m8 + uv * v, m9 + vv * v
+                        m10, m11, m12 = m10 + uu * uu, m11 + uu * uv, m12 + uu * vv
+                        m13, m14 = m13 + uv * vv, m14 + vv * vv
+                        r0, r1, r2 = r0 + d, r1 + u * d, r2 + v * d
+                        r3, r4, r5 = r3 + uu * d, r4 + uv * d, r5 + vv * d
                         square += d * d
                         noise += s * s
                 if n < LEAST_NEIGHBOURS:
                     break
+                # Of the terms 1, u, v, u^2, u v and v^2, the lower half.
+                moments[0, 0] = n
+                moments[1, 0], moments[1, 1] = m1, m3
+                moments[2, 0], moments[2, 1], moments[2, 2] = m2, m4, m5
+                moments[3, 0], moments[3, 1], moments[3, 2], moments[3, 3] = m3, m6, m7, m10
+                moments[4, 0], moments[4, 1], moments[4, 2], moments[4, 3] = m4, m7, m8, m11
+                moments[5, 0], moments[5, 1], moments[5, 2], moments[5, 3] = m5, m8, m9, m12
+                moments[4, 4], moments[5, 4], moments[5, 5] = m12, m13, m14
+                right[0], right[1], right[2] = r0, r1, r2
+                right[3], right[4], right[5] = r3, r4, r5
                 # Cholesky's decomposition: moments = root root^T.
                 solvable = True
                 for i in range(6):
