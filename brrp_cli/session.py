@@ -145,15 +145,21 @@ class Reconstructor:
             masked, aside = self._with_masks(frame)
         seconds = time.perf_counter() - start
         if self._track is not None:
-            result = self._tracked(masked, aside, mends=made)
+            result = self._tracked(masked, aside, frame.corrected, mends=made)
         else:
             result = self._all(masked)
-            result = self._mended(result, self._all, aside) if made else result
+            if made:
+                result = self._mended(result, self._all, aside, corrected=frame.corrected)
         result.seconds["masks"] = seconds
         return replace(result, segmentation=asdict(self._segmentation)) if made else result
 
     def _tracked(
-        self, frame: Frame, aside: NDArray[np.int64] | None, *, mends: bool
+        self,
+        frame: Frame,
+        aside: NDArray[np.int64] | None,
+        corrected: Collection[int],
+        *,
+        mends: bool,
     ) -> Reconstruction:
         """All objects under the ids of their tracks; those that have not moved as they were."""
         assert self._track is not None
@@ -164,6 +170,8 @@ class Reconstructor:
             first_frame(frame) if self._last is None else follow(self._last, frame, self._track)
         )
         seen, kept = followed.frame, []
+        theirs = np.isin(frame.segmap, [*corrected])
+        corrected = np.unique(seen.segmap[theirs]).tolist()
         # Held to the frame that they were inferred from: what creeps is found in the end.
         for made, result in self._made:
             still = unmoved(made, seen, self._track)
@@ -186,7 +194,7 @@ class Reconstructor:
             fresh = aside
             if self._last is not None and aside is not None:
                 fresh = not_tried(self._last, frame, aside, self._track)
-            result = self._mended(result, infer, fresh, todo, followed.next_id)
+            result = self._mended(result, infer, fresh, todo, followed.next_id, corrected)
         result.seconds["tracking"] = seconds
         # Mending may have made anew what was kept.
         was = {item.object_id: item for item in kept}
@@ -208,9 +216,10 @@ class Reconstructor:
         aside: NDArray[np.int64] | None,
         asked: Collection[int] | None = None,
         first_free: int = 1,
+        corrected: Collection[int] = (),
     ) -> Reconstruction:
-        again = Again(infer, self._tried)
-        return mend(result, self._prior, again, self._segmentation, aside, asked, first_free)
+        again, config = Again(infer, self._tried), self._segmentation
+        return mend(result, self._prior, again, config, aside, asked, first_free, corrected)
 
     def _stream(self, frame: Frame, ids: Collection[int]) -> Stream | None:
         """What earlier frames showed of those objects of this one that are at rest since; all else

@@ -21,10 +21,12 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class MadeMasks:
-    """How the masks of a frame were made, and which (H, W) were left out; 0 = none."""
+    """How the masks of a frame were made, which (H, W) were left out, 0 = none, and which ids were
+    corrected since."""
 
     config: SegmentConfig
     aside: NDArray[np.int64] | None
+    corrected: frozenset[int] = frozenset()
 
 
 def make_masks(
@@ -58,12 +60,12 @@ def make_masks(
 def masks_of(
     frame: Frame, output: Path, config: SegmentConfig, *, overwrite: bool
 ) -> tuple[Frame, MadeMasks | None]:
-    """A frame that has masks, and how they were made; None where brrp did not make them, or they
-    were corrected."""
+    """A frame that has masks, and how they were made; None where brrp did not make them."""
     if frame.aside is None:
         return frame, None
     refuse_existing([_picture(output)], overwrite)
-    return frame.with_masks(frame.segmap), MadeMasks(config, frame.aside)
+    made = MadeMasks(config, frame.aside, frame.corrected)
+    return frame.with_masks(frame.segmap), made
 
 
 def tell_mended(before: Frame, after: Frame, output: Path) -> None:

@@ -256,7 +256,9 @@ def command(
         with one_image(retrieval):
             result = run(frame)
             if masks is not None:
-                result = mend(result, prior, again, masks.config, masks.aside)
+                result = mend(
+                    result, prior, again, masks.config, masks.aside, corrected=masks.corrected
+                )
         helpers.start()
         if masks is not None:
             tell_mended(frame, result.frame, output)

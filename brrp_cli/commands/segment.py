@@ -100,11 +100,12 @@ def command(
         frame = source.make_masks(frame, seed, config)
     before = frame
     for object_id, pieces in splits:
-        frame = frame.with_masks(edit_masks.split(frame, object_id, pieces, seed, config))
+        split = edit_masks.split(frame, object_id, pieces, seed, config)
+        frame = edit_masks.corrected(frame, split)
     for group in merges:
-        frame = frame.with_masks(edit_masks.merge(frame, group))
+        frame = edit_masks.corrected(frame, edit_masks.merge(frame, group))
     for group in drops:
-        frame = frame.with_masks(edit_masks.drop(frame, group))
+        frame = edit_masks.corrected(frame, edit_masks.drop(frame, group))
     with report_of(as_json) as report:
         report["objects"] = _report(require_objects(frame), before)
         write_picture(frame, picture)

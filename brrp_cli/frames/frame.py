@@ -28,7 +28,8 @@ class Frame:
     T_world_cam : (4, 4) float64 or None, camera frame to world frame
     source : the file or folder it came from, for messages
     aside : (H, W) int64, masks that were left out where brrp made those of `segmap`, 0 = none: what
-        is recognised mends such masks. None where masks came with the frame, or were corrected
+        is recognised mends such masks. None where masks came with the frame
+    corrected : ids of those of such masks that somebody corrected: they stay as they are
 
     The arrays are read-only copies: nothing downstream can change what the caller handed in.
     """
@@ -40,6 +41,7 @@ class Frame:
     T_world_cam: NDArray[np.float64] | None = None
     source: Path | None = field(default=None, compare=False)
     aside: NDArray[np.int64] | None = field(default=None, compare=False)
+    corrected: frozenset[int] = field(default=frozenset(), compare=False)
 
     def __post_init__(self) -> None:
         height, width = self.segmap.shape
@@ -103,7 +105,10 @@ class Frame:
         return [int(i) for i in np.unique(self.segmap[self.segmap != BACKGROUND])]
 
     def with_masks(
-        self, segmap: NDArray[np.integer], aside: NDArray[np.integer] | None = None
+        self,
+        segmap: NDArray[np.integer],
+        aside: NDArray[np.integer] | None = None,
+        corrected: frozenset[int] = frozenset(),
     ) -> Frame:
         """The same image with other masks (H, W). Unlike `dataclasses.replace` it copies nothing
         but these. Errors: FrameError for another shape."""
@@ -120,6 +125,7 @@ class Frame:
             if masks is not None:
                 masks.setflags(write=False)
             object.__setattr__(frame, name, masks)
+        object.__setattr__(frame, "corrected", corrected)
         vars(frame).pop("object_ids", None)
         return frame
 

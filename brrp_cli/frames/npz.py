@@ -15,16 +15,19 @@ from brrp_cli.frames.build import make_frame, require_objects
 from brrp_cli.frames.frame import Frame
 from brrp_cli.geometry import backproject
 
-ACCEPTED = frozenset({"rgb", "depth", "K", "xyz", "segmap", "seg", "T_world_cam", "left_out"})
-_NEEDED = "depth and K, or xyz; segmap or seg; optional: rgb, T_world_cam, left_out"
+ACCEPTED = frozenset(
+    {"rgb", "depth", "K", "xyz", "segmap", "seg", "T_world_cam", "left_out", "corrected"}
+)
+_NEEDED = "depth and K, or xyz; segmap or seg; optional: rgb, T_world_cam, left_out, corrected"
 
 
 def load_frame(path: str | Path, *, depth_scale: float | None = None, masks: bool = True) -> Frame:
     """Read a frame file.
 
     Keys: `depth` (H, W) and `K` (3, 3), or `xyz` (H, W, 3); `segmap` or `seg` (H, W); `rgb`
-    (H, W, 3) uint8 and `T_world_cam` (4, 4) where known; `left_out` (H, W) for `Frame.aside`. Units
-    and checks as in `make_frame`. Pickles are never loaded.
+    (H, W, 3) uint8 and `T_world_cam` (4, 4) where known; `left_out` (H, W) for `Frame.aside`, and
+    `corrected` (n,) for `Frame.corrected`. Units and checks as in `make_frame`. Pickles are never
+    loaded.
 
     depth_scale : raw depth x depth_scale = metres
     masks : whether the file must have masks with an object in them
@@ -61,7 +64,8 @@ def load_frame(path: str | Path, *, depth_scale: float | None = None, masks: boo
         source=path,
     )
     if "left_out" in arrays and has_masks:
-        frame = frame.with_masks(frame.segmap, _left_out(arrays["left_out"], frame))
+        corrected = _corrected(arrays.get("corrected"), frame)
+        frame = frame.with_masks(frame.segmap, _left_out(arrays["left_out"], frame), corrected)
     return require_objects(frame) if masks else frame
 
 
@@ -76,6 +80,21 @@ def _left_out(masks: NDArray[Any], frame: Frame) -> NDArray[np.integer]:
             fix="leave it out, or make the masks again: `brrp segment FRAME.npz --again`",
         )
     return masks
+
+
+def _corrected(ids: NDArray[Any] | None, frame: Frame) -> frozenset[int]:
+    """Errors: FrameError if they are no ids."""
+    if ids is None:
+        return frozenset()
+    if ids.ndim != 1 or not np.issubdtype(ids.dtype, np.integer):
+        raise FrameError(
+            "The frame's corrected holds no ids",
+            where=frame.source,
+            expected="integers, (n,)",
+            found=f"{ids.dtype}, {ids.shape}",
+            fix="leave it out, or make the masks again: `brrp segment FRAME.npz --again`",
+        )
+    return frozenset(int(i) for i in ids) & frozenset(frame.object_ids)
 
 
 def save_frame(frame: Frame, path: str | Path) -> None:
@@ -95,5 +114,7 @@ def save_frame(frame: Frame, path: str | Path) -> None:
         arrays["T_world_cam"] = frame.T_world_cam
     if frame.aside is not None:
         arrays["left_out"] = frame.aside
+    if frame.corrected:
+        arrays["corrected"] = np.array(sorted(frame.corrected))
     with atomic_path(Path(path)) as partial, partial.open("wb") as stream:
         np.savez_compressed(stream, **arrays)  # type: ignore[arg-type]

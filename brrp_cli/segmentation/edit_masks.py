@@ -18,6 +18,19 @@ from brrp_cli.segmentation.cut import boundary_of, cut_at_strongest, filled
 log = logging.getLogger(__name__)
 
 
+def corrected(frame: Frame, segmap: NDArray[np.int64]) -> Frame:
+    """The frame with masks (H, W) that somebody corrected. Where brrp made its masks, those that
+    are not what they were stay so from then on, and what has none stays without; what is
+    recognised mends the others."""
+    if frame.aside is None:
+        return frame.with_masks(segmap)
+    changed = segmap != frame.segmap
+    theirs = {*frame.corrected, *segmap[changed].tolist(), *frame.segmap[changed].tolist()}
+    theirs &= {*np.unique(segmap).tolist()} - {BACKGROUND}
+    known = changed | np.isin(segmap, [*theirs])
+    return frame.with_masks(segmap, np.where(known, BACKGROUND, frame.aside), frozenset(theirs))
+
+
 def merge(frame: Frame, ids: Sequence[int]) -> NDArray[np.int64]:
     """Masks (H, W) in which the objects have the first one's id. Errors: FrameError."""
     _known(frame, ids)

@@ -6,7 +6,7 @@ its own mask that it does not explain. All of it is told from rendered depth, ma
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -50,6 +50,7 @@ def mend_masks(
     tolerance: NDArray[np.floating],
     config: MendConfig,
     first_free: int = 1,
+    fixed: Collection[int] = (),
 ) -> Mended:
     """The masks after each placed object claimed what it explains and gave back what it does not.
 
@@ -61,6 +62,7 @@ def mend_masks(
     height : (H, W) metres above the support plane, None where there is none: what is given back and
     lies on it is background
     tolerance : (H, W) metres; first_free : what becomes an object of its own has this id at least
+    fixed : ids of masks that nothing takes over
     """
     found = segmap.copy()
     seen = np.isfinite(depth) & (depth > 0)
@@ -73,7 +75,7 @@ def mend_masks(
     for p in trusted:
         if not (found == p.object_id).any():  # another one took it over
             continue
-        _claim(found, p, seen, explained[p.object_id], strongest, config)
+        _claim(found, p, seen, explained[p.object_id], strongest, fixed, config)
     for p in trusted:
         if (found == p.object_id).any():
             _give_back(found, p, seen, explained, height, tolerance, depth, first_free, config)
@@ -111,12 +113,13 @@ def _claim(
     seen: Mask,
     explained: Mask,
     weights: dict[int, float],
+    fixed: Collection[int],
     config: MendConfig,
 ) -> None:
     """Masks that lie within the object as it was placed become part of it."""
     for other in np.unique(found[explained & (found != p.object_id) & (found != BACKGROUND)]):
         mask = (found == other) & seen
-        if explained[mask].sum() < config.claimed * mask.sum():
+        if other in fixed or explained[mask].sum() < config.claimed * mask.sum():
             continue
         # A recognised object yields to one that explains more of the image with it.
         if int(other) in weights and weights[int(other)] > p.weight:

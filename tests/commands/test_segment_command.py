@@ -47,17 +47,24 @@ def test_masks_are_corrected_by_id(saved, tmp_path):
     assert (tmp_path / "g.masks.png").is_file()
 
 
-def test_made_masks_are_known_as_such_until_they_are_corrected(saved, tmp_path):
+def test_made_masks_are_known_as_such_and_which_of_them_are_corrected(saved, tmp_path):
     path, _ = saved
-    for arguments, made in (
-        ((path, "-o", tmp_path / "kept.npz"), False),
-        ((path, "--again", "-o", tmp_path / "made.npz"), True),
-        ((tmp_path / "made.npz", "-o", tmp_path / "same.npz"), True),
-        ((tmp_path / "made.npz", "--drop", "1", "-o", tmp_path / "fixed.npz"), False),
+    made = tmp_path / "made.npz"
+    for arguments, is_made, corrected in (
+        ((path, "-o", tmp_path / "kept.npz"), False, set()),
+        ((path, "--again", "-o", made), True, set()),
+        ((made, "-o", tmp_path / "same.npz"), True, set()),
+        ((made, "--drop", "1", "-o", tmp_path / "dropped.npz"), True, set()),
+        ((made, "--merge", "1,2", "-o", tmp_path / "merged.npz"), True, {1}),
+        ((made, "--split", "2", "-o", tmp_path / "split.npz"), True, {2, 4}),
+        ((tmp_path / "merged.npz", "--drop", "3", "-o", tmp_path / "both.npz"), True, {1}),
+        ((path, "--drop", "4", "-o", tmp_path / "given.npz"), False, set()),
     ):
         result = run(*arguments)
         assert result.exit_code == 0, result.output
-        assert (load_frame(arguments[-1]).aside is not None) is made, arguments
+        found = load_frame(arguments[-1])
+        assert (found.aside is not None) is is_made, arguments
+        assert found.corrected == corrected, arguments
 
 
 def test_one_mask_over_two_things_is_split_where_they_meet(saved, tmp_path):

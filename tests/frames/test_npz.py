@@ -65,7 +65,7 @@ def test_the_same_frame_is_the_same_bytes(tmp_path):
     assert (tmp_path / "a.npz").read_bytes() == (tmp_path / "b.npz").read_bytes()
 
 
-def test_masks_that_were_left_out_come_back_until_masks_are_corrected(tmp_path):
+def test_masks_that_were_left_out_come_back_until_other_masks_are_given(tmp_path):
     aside = np.zeros_like(MASK)
     aside[5, :3] = 2
     frame = make_frame(rgb=RGB, segmap=MASK, depth=DEPTH, K=K).with_masks(MASK, aside)
@@ -73,9 +73,27 @@ def test_masks_that_were_left_out_come_back_until_masks_are_corrected(tmp_path):
     found = load_frame(tmp_path / "a.npz")
     assert same(found, frame) and np.array_equal(found.aside, aside)
     assert not found.aside.flags.writeable
-    corrected = found.with_masks(found.segmap)
-    save_frame(corrected, tmp_path / "b.npz")
-    assert corrected.aside is None and load_frame(tmp_path / "b.npz").aside is None
+    given = found.with_masks(found.segmap)
+    save_frame(given, tmp_path / "b.npz")
+    assert given.aside is None and load_frame(tmp_path / "b.npz").aside is None
+
+
+def test_which_masks_were_corrected_comes_back(tmp_path):
+    known = frozenset(make_frame(rgb=RGB, segmap=MASK, depth=DEPTH, K=K).object_ids[:1])
+    frame = make_frame(rgb=RGB, segmap=MASK, depth=DEPTH, K=K).with_masks(MASK, MASK * 0, known)
+    save_frame(frame, tmp_path / "a.npz")
+    assert known and load_frame(tmp_path / "a.npz").corrected == known
+    assert frame.with_masks(MASK).corrected == frozenset()
+    # An id that no mask has is none.
+    np.savez(tmp_path / "b.npz", depth=DEPTH, K=K, segmap=MASK, left_out=MASK * 0, corrected=[777])
+    assert load_frame(tmp_path / "b.npz").corrected == frozenset()
+
+
+@pytest.mark.parametrize("wrong", [np.zeros((1, 1), int), np.array([1.0])])
+def test_ids_of_corrected_masks_are_checked(tmp_path, wrong):
+    np.savez(tmp_path / "f.npz", depth=DEPTH, K=K, segmap=MASK, left_out=MASK * 0, corrected=wrong)
+    with pytest.raises(FrameError, match="corrected"):
+        load_frame(tmp_path / "f.npz")
 
 
 @pytest.mark.parametrize("wrong", [MASK[1:], MASK + 0.5, np.zeros((6, 8, 2), int)])

@@ -94,6 +94,11 @@ def mended(first, prior, again, aside):
     return mend(first, prior, again, SegmentConfig(), aside)
 
 
+def each_mask(segmap):
+    """Whatever their ids are."""
+    return {(segmap == i).tobytes() for i in np.unique(segmap) if i}
+
+
 def taken_for(result):
     return {item.object_id: item.outcome.name for item in result.objects if item.recognised}
 
@@ -274,3 +279,37 @@ def test_masks_that_were_made_before_are_mended_by_session_and_command(
         assert np.array_equal(stored.segmap, after.segmap), name
         assert stored.aside is None, "what was mended is given from then on"
         assert (tmp_path / f"{name}.masks.png").exists() == (name == "made")
+
+
+def test_what_was_corrected_stays_and_the_rest_is_mended(prior, frame, aside):
+    session = Reconstructor(prior, retriever="appearance", workers=1)
+    result = session(frame.with_masks(frame.segmap, aside, frozenset({BOTH})))
+    assert np.array_equal(result.frame.segmap == BOTH, frame.segmap == BOTH)
+    others = {taken for i, taken in taken_for(result).items() if i != BOTH}
+    assert others == {"green_plate", "red_box"}
+    result = session(frame.with_masks(frame.segmap, aside, frozenset({BOX, OTHER_HALF})))
+    for half in (BOX, OTHER_HALF):
+        assert np.array_equal(result.frame.segmap == half, frame.segmap == half)
+    assert {"green_plate", "red_can", "yellow_ball"} <= set(taken_for(result).values())
+
+
+def test_a_mask_that_was_dropped_stays_away_and_the_rest_is_mended(
+    prior, frame, aside, mended, tmp_path
+):
+    save_frame(frame.with_masks(frame.segmap, aside), tmp_path / "made.npz")
+    drop = [tmp_path / "made.npz", "--drop", STRANGE_ID, "-o", tmp_path / "fixed.npz"]
+    options = ["--prior", prior.path, "--retriever", "appearance", "-o", tmp_path / "out"]
+    for run in (["segment", *drop], ["reconstruct", tmp_path / "fixed.npz", *options]):
+        result = CliRunner().invoke(main, list(map(str, run)))
+        assert result.exit_code == 0, result.output
+    expected = mended.frame.segmap
+    found = load_frame(tmp_path / "out" / "frame.npz").segmap
+    assert each_mask(found) == each_mask(np.where(expected == STRANGE_ID, 0, expected))
+
+
+def test_a_stream_mends_what_was_not_corrected_under_the_ids_of_its_tracks(prior, frame, aside):
+    session = Reconstructor(prior, retriever="appearance", workers=1, track=True)
+    session(frame.with_masks(np.where(frame.segmap == BOTH, 7, 0)))
+    result = session(frame.with_masks(frame.segmap, aside, frozenset({BOTH})))
+    assert np.array_equal(result.frame.segmap == 7, frame.segmap == BOTH)
+    assert {"green_plate", "red_box"} <= set(taken_for(result).values())

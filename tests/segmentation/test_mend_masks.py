@@ -23,12 +23,12 @@ def seen(*meshes):
     return frame, [look([mesh], K, SHAPE).depth for mesh in meshes]
 
 
-def mended(segmap, frame, placed, config=None, first_free=1):
+def mended(segmap, frame, placed, config=None, first_free=1, fixed=()):
     noise = np.random.default_rng(0).normal(0, 0.001, SHAPE)
     depth = frame.points[..., 2] + noise
     height = TABLE.signed_distance(frame.points)
     config, tolerance = config or MendConfig(), np.full(SHAPE, 0.008)
-    return mend_masks(segmap, depth, placed, height, tolerance, config, first_free)
+    return mend_masks(segmap, depth, placed, height, tolerance, config, first_free, fixed)
 
 
 def in_three(mask, ids):
@@ -48,6 +48,13 @@ def test_one_box_in_three_pieces_is_one_again():
     assert np.array_equal(result.segmap == 4, frame.segmap == 1)
     assert np.array_equal(result.segmap == 2, frame.segmap == 2)
     assert result.changed == (4,)
+
+
+def test_a_piece_that_is_fixed_is_not_taken_over():
+    frame, (box,) = seen(BOX)
+    pieces = in_three(frame.segmap == 1, (3, 4, 5))
+    result = mended(pieces, frame, [Placed(4, 0.9, box)], fixed={5})
+    assert np.array_equal(result.segmap, np.where(pieces == 3, 4, pieces))
 
 
 def test_pieces_that_were_all_recognised_become_one():
