@@ -195,9 +195,10 @@ def told(each: ObjectGrasps) -> str:
     if not each.grasps:
         return f"object {each.object_id}: no grasp, {each.why}"
     best = each.grasps[0]
+    count = len(each.grasps)
     return (
-        f"object {each.object_id}: {len(each.grasps)} grasps, the best holds with probability "
-        f"{best.score:.2f}, {best.width * 1000:.0f} mm wide"
+        f"object {each.object_id}: {count} grasp{'' if count == 1 else 's'}, the best"
+        f" holds with probability {best.score:.2f}, {best.width * 1000:.0f} mm wide"
     )
 
 

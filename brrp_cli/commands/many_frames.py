@@ -152,7 +152,7 @@ def _frame(work: Work, about: dict[str, Any], folder: Path) -> bool:
     about["status"] = DONE
     about["seconds"] = round(time.perf_counter() - start, 2)
     about["objects"] = [each.record() for each in table]
-    say(_line(name, table, about["seconds"]))
+    say(one_line(name, table, about["seconds"]))
     return any(each.failed for each in table)
 
 
@@ -171,9 +171,10 @@ def _failure(about: dict[str, Any], error: BrrpError) -> bool:
     return True
 
 
-def _line(name: str, table: list[Told], seconds: float) -> str:
+def one_line(name: str, table: list[Told], seconds: float) -> str:
+    """A frame in one line: how many of its objects have a mesh, and what these were taken for."""
     made = sum(not each.failed for each in table)
-    taken = [each.taken_for or each.how for each in table if each.taken_for or each.how]
+    taken = [each.name for each in table if each.taken_for or each.how]
     warned = sum(bool(each.warnings) for each in table)
     line = f"  {name}: {made} of {len(table)} objects, {seconds:.1f} s"
     line += f": {', '.join(taken)}" if taken else ""

@@ -46,6 +46,14 @@ class Told:
     warnings: tuple[str, ...]
     failed: bool
 
+    @property
+    def name(self) -> str:
+        """What it was taken for, in words; "-" where nothing is known."""
+        name = self.taken_for or self.how or "-"
+        if self.how == "retrieved":
+            name += " (retrieved)"
+        return f"like {name}" if self.how == "similar" else name
+
     def record(self) -> dict[str, Any]:
         """For --json; metres."""
         return {
@@ -134,17 +142,12 @@ def lines(table: list[Told]) -> list[str]:
 
 
 def _row(each: Told) -> tuple[str, ...]:
-    name = each.taken_for or each.how or "-"
-    if each.how == "retrieved":
-        name += " (retrieved)"
-    if each.how == "similar":
-        name = f"like {name}"
     # Of a failure the log has told the rest.
     said = each.message.split("\n")[0]
     status = [] if each.status == OK else [each.status]
     return (
         str(each.object_id),
-        name,
+        each.name,
         "-" if each.weight is None else f"{each.weight:.2f}",
         "-" if each.size_factor is None else f"{each.size_factor:.2f}",
         "-" if each.uncertainty is None else f"{each.uncertainty * 1000:.1f}",

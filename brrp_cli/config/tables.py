@@ -74,7 +74,8 @@ def _value(value: Any, kind: Any, field: Field[Any], place: str) -> Any:
         return _scalar(value, kind, field, place)
     inner = get_args(kind)
     count = None if inner[-1] is Ellipsis else len(inner)
-    if not isinstance(value, list) or not value or count not in (None, len(value)):
+    # Tuples are of a record that was never written.
+    if not isinstance(value, (list, tuple)) or not value or count not in (None, len(value)):
         raise _refused(place, f"a list of {count or 'one or more'} numbers", value)
     return tuple(_scalar(each, inner[0], field, place) for each in value)
 

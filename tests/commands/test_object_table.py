@@ -10,6 +10,7 @@ import pytest
 import trimesh
 from table_scene import TABLE, in_camera, photograph, placed
 
+from brrp_cli.commands.many_frames import one_line
 from brrp_cli.commands.object_table import lines, told
 from brrp_cli.reconstruction import (
     LOGIT_VARIANCE,
@@ -59,6 +60,9 @@ def test_the_outcome_is_told_and_not_what_retrieval_held_probable():
     unknown = tell(item(weights=(0.0, 0.0), none=1.0))
     assert (unknown.taken_for, unknown.how, unknown.weight) == (None, "not in the prior", 1.0)
     assert "not in the prior" in lines([unknown])[1]
+    kin = replace(unknown, taken_for="bowl", how="similar")
+    assert kin.name == "like bowl" and "like bowl" in lines([kin])[1]
+    assert "1 of 1 objects, 2.0 s: like bowl" in one_line("scene", [kin], 2.0)
     assert tell(item(unit=LOGIT_VARIANCE)).uncertainty is None
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import asdict, replace
 
 import numpy as np
 import pytest
@@ -123,6 +123,9 @@ def test_without_a_table_there_are_none():
 
 def test_results_tell_what_a_bin_was():
     assert segmentation_of(None) == CONFIG
+    # Of a result in memory, whose record was never written, too.
+    own = replace(CONFIG, min_area=0.5)
+    assert segmentation_of(asdict(own)) == own
     assert segmentation_of({"bins": {"area": 10.0}}).bins.area == 10.0
     none = segmentation_of({"bins": {"area": 10.0, "rectangle": 10.0}})
     assert bin_walls(seen(THING), none) == []
