@@ -40,11 +40,12 @@ def beyond_hull(hull: Array, plan: NDArray[np.floating]) -> Array:
 def _outer(plan: Array) -> Array:
     """The points (m, 2) that lie on or outside the octagon of those that lie farthest in eight
     directions: all corners of the hull are among them."""
+    spatial = import_library("scipy.spatial")
     x, y = np.ascontiguousarray(plan.T)
     corners = [each for along in (x, x + y, y, y - x) for each in (along.argmin(), along.argmax())]
     try:
-        octagon = import_library("scipy.spatial").ConvexHull(plan[corners]).equations
-    except (import_library("scipy.spatial").QhullError, ValueError):
+        octagon = spatial.ConvexHull(plan[corners]).equations
+    except (spatial.QhullError, ValueError):
         return plan
     # Not what rounding may have put inside.
     return plan[~in_hull(octagon, plan, -1e-9 * float(np.abs(plan).max()))]

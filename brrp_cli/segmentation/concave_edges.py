@@ -66,14 +66,9 @@ def hollow_angles(points: Array, normals: Array, config: ConcaveEdgesConfig) -> 
 
 def _dot(first: Array, second: Array) -> Array:
     """Of vectors (..., 3)."""
-    return _sum_of_products(np.moveaxis(first, -1, 0), np.moveaxis(second, -1, 0))
-
-
-def _sum_of_products(first: Array, second: Array) -> Array:
-    """Of vectors (3, ...)."""
-    found = first[0] * second[0]
-    found += first[1] * second[1]
-    found += first[2] * second[2]
+    found = first[..., 0] * second[..., 0]
+    found += first[..., 1] * second[..., 1]
+    found += first[..., 2] * second[..., 2]
     return np.asarray(found)
 
 
