@@ -35,17 +35,10 @@ from brrp_cli.methods.shared_work import started_later
 from brrp_cli.prior.store import Prior, open_prior
 from brrp_cli.reconstruction import ObjectReconstruction, Reconstruction
 from brrp_cli.retrieval.base import one_image
-from brrp_cli.tracking import (
-    Followed,
-    at_rest,
-    camera_motion,
-    first_frame,
-    follow,
-    not_tried,
-    spread_out,
-    unmoved,
-    with_known,
-)
+from brrp_cli.segmentation.mend_masks import changed_masks
+from brrp_cli.tracking.carried import with_carried
+from brrp_cli.tracking.followed import Followed, first_frame, follow, not_tried, with_known
+from brrp_cli.tracking.motion import at_rest, camera_motion, spread_out, unmoved
 
 if TYPE_CHECKING:
     from brrp_cli.retrieval.base import Retriever
@@ -164,8 +157,11 @@ class Reconstructor:
         """All objects under the ids of their tracks; those that have not moved as they were."""
         assert self._track is not None
         start = time.perf_counter()
+        carried = np.zeros(frame.shape, np.bool_)
         if self._last is not None and aside is not None:
             frame = with_known(self._last, frame, aside, self._track)
+        if self._last is not None and mends:
+            frame, carried = with_carried(self._last, frame, self._track, corrected)
         followed = (
             first_frame(frame) if self._last is None else follow(self._last, frame, self._track)
         )
@@ -206,7 +202,11 @@ class Reconstructor:
         newest = replace(result, objects=new, image=None)
         self._made = [(result.frame, newest), *left] if new else left
         next_id = max(followed.next_id, max(result.frame.object_ids) + 1)
-        self._last = _followed(result.frame, next_id, aside)
+        mended = set(np.unique(result.frame.segmap[carried]).tolist()) - {BACKGROUND}
+        if mends:
+            least = self._segmentation.mend.least_part
+            mended |= set(changed_masks(result.frame.segmap, seen.segmap, least))
+        self._last = _followed(result.frame, next_id, frozenset(mended), aside)
         return result
 
     def _mended(
@@ -317,14 +317,17 @@ class Reconstructor:
         return frame.with_masks(segmap), aside
 
 
-def _followed(frame: Frame, next_id: int, aside: NDArray[np.int64] | None) -> Followed:
+def _followed(
+    frame: Frame, next_id: int, mended: frozenset[int], aside: NDArray[np.int64] | None
+) -> Followed:
     """What to follow into the next frame; aside : (H, W) masks that were left out, 0 = none."""
     if aside is None:
-        return Followed(frame, next_id)
+        return Followed(frame, next_id, mended)
     strangers = np.where(frame.segmap == BACKGROUND, aside, BACKGROUND)
     return Followed(
         frame,
         next_id,
+        mended,
         of_left_out(frame, aside),
         frame.with_masks(strangers) if strangers.any() else None,
     )

@@ -19,7 +19,8 @@ from brrp_cli.methods.registry import METHODS
 from brrp_cli.raycast import look
 from brrp_cli.reconstruction import ObjectReconstruction
 from brrp_cli.shapes import solids
-from brrp_cli.tracking import at_rest, camera_motion, first_frame, follow, spread_out
+from brrp_cli.tracking.followed import first_frame, follow
+from brrp_cli.tracking.motion import at_rest, camera_motion, spread_out
 
 RED, GREEN, BLUE = (200, 60, 50), (60, 180, 70), (60, 80, 200)
 YAW = 0.4

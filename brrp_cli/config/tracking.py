@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from brrp_cli.config.ranges import share
+from brrp_cli.config.ranges import between, share
 
 
 @dataclass(frozen=True)
@@ -42,6 +42,22 @@ class SharpenConfig:
 
 
 @dataclass(frozen=True)
+class CarryConfig:
+    """When a mask that was mended holds in the next frame.
+
+    gap : metres in depth within which two frames saw the same surface
+    moved : part of an object's points, of those that are not hidden, whose place is free by now, at
+        most
+    opening : half the width, pixels, of what is too thin to be an object; least_pixels : of one
+    """
+
+    gap: float = 0.012
+    moved: float = share(0.1)
+    opening: int = between(3, 1, 64)
+    least_pixels: int = 200
+
+
+@dataclass(frozen=True)
 class TrackConfig:
     """Lengths are metres, in the camera frame of the newer image.
 
@@ -52,11 +68,13 @@ class TrackConfig:
         number of pixels may differ
     still : median of what depth has changed by, at most, on an object that has not moved; of the
         background the median of its size; noise : median of its size on such an object, at most;
-        still_mask : IoU of its two masks, at least
+        beyond 1 m both sizes may grow with the square of depth, as noise does
+    still_mask : IoU of its two masks, at least
     still_camera : metres and radians by which poses of one camera that stands may differ. Where no
     pose is given, a camera stands if both images share a share `ground` of background with depth,
     which has changed by `still` at most in the middle and `still_tail` times that in nine tenths of
     it, and its colours by `still_colour`, of 255
+    carry : when masks that were mended hold in the next frame
     sharpen : how earlier views of an object join the newest one; None = they do not
     """
 
@@ -71,4 +89,5 @@ class TrackConfig:
     ground: float = share(0.2)
     still_tail: float = 5.0
     still_colour: float = 10.0
+    carry: CarryConfig = field(default_factory=CarryConfig)
     sharpen: SharpenConfig | None = field(default_factory=SharpenConfig)

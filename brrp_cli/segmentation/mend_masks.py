@@ -79,15 +79,22 @@ def mend_masks(
     for p in trusted:
         if (found == p.object_id).any():
             _give_back(found, p, seen, explained, height, tolerance, depth, first_free, config)
-    changed = [
-        int(i)
-        for i in np.unique(found[found != BACKGROUND])
-        if _differs(found == i, segmap == i, config)
-    ]
+    changed = changed_masks(found, segmap, config.least_part)
     gone = np.setdiff1d(segmap, found)
     if not changed and not len(gone):
         return Mended(segmap, ())
     return Mended(found, tuple(changed))
+
+
+def changed_masks(
+    now: NDArray[np.int64], before: NDArray[np.int64], least_part: float
+) -> list[int]:
+    """Ids of those masks (H, W) that differ from those before by more than that part of them."""
+
+    def differs(one: Mask, other: Mask) -> bool:
+        return bool((one ^ other).sum() > least_part * other.sum())
+
+    return [int(i) for i in np.unique(now[now != BACKGROUND]) if differs(now == i, before == i)]
 
 
 def explained_pixels(
@@ -171,7 +178,3 @@ def _give_back(
             found[pixels] = BACKGROUND
         else:
             found[pixels] = max(int(found.max()) + 1, first_free)
-
-
-def _differs(now: Mask, before: Mask, config: MendConfig) -> bool:
-    return bool((now ^ before).sum() > config.least_part * before.sum())

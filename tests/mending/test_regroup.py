@@ -313,3 +313,24 @@ def test_a_stream_mends_what_was_not_corrected_under_the_ids_of_its_tracks(prior
     result = session(frame.with_masks(frame.segmap, aside, frozenset({BOTH})))
     assert np.array_equal(result.frame.segmap == 7, frame.segmap == BOTH)
     assert {"green_plate", "red_box"} <= set(taken_for(result).values())
+
+
+def test_what_was_mended_keeps_its_id_and_is_not_tried_again(prior, frame, aside, monkeypatch):
+    tried = []
+
+    def counted(frame, masks, *args, **kwargs):
+        tried.append(len(masks))
+        return try_masks(frame, masks, *args, **kwargs)
+
+    monkeypatch.setattr("brrp_cli.session.try_masks", counted)
+    made = frame.with_masks(frame.segmap, aside)
+    with Reconstructor(prior, retriever="appearance", workers=1, track=True) as session:
+        first = session(made)
+        assert tried
+        tried.clear()
+        second = session(made)
+    assert not tried
+    assert np.array_equal(first.frame.segmap, second.frame.segmap)
+    assert taken_for(first) == taken_for(second)
+    posteriors = {item.object_id: item.posterior for item in first.objects}
+    assert all(item.posterior is posteriors[item.object_id] for item in second.objects)

@@ -1,0 +1,70 @@
+"""Which objects of a frame are those of the frame before.
+
+An object is where its points fall, moved as the camera was. Objects that were moved are looked for
+near by, by their colour and size.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brrp_cli.config.tracking import TrackConfig
+from brrp_cli.frames.frame import Frame
+from brrp_cli.frames.projection import at_pixels
+from brrp_cli.geometry import transform_points
+
+
+def match(
+    last: Frame, frame: Frame, T_now_last: NDArray[np.float64] | None, config: TrackConfig
+) -> dict[int, int]:
+    """Id in the frame -> id in the last one: first by place, then, of what is left, by nearness,
+    colour and size."""
+    T = np.eye(4) if T_now_last is None else T_now_last
+    found = _assign(last, frame, lambda a, b: _overlap(last, frame, T, a, b, config), {})
+    return found | _assign(last, frame, lambda a, b: _alike(last, frame, T, a, b, config), found)
+
+
+def _assign(
+    last: Frame, frame: Frame, score: Callable[[int, int], float], taken: dict[int, int]
+) -> dict[int, int]:
+    """Pairs (id, id of the last frame) of the largest sum of scores, of those above 0."""
+    from scipy.optimize import linear_sum_assignment
+
+    old = [i for i in last.object_ids if i not in taken.values()]
+    new = [i for i in frame.object_ids if i not in taken]
+    if not old or not new:
+        return {}
+    scores = np.array([[score(a, b) for b in new] for a in old])
+    rows, columns = linear_sum_assignment(-scores)
+    return {new[c]: old[r] for r, c in zip(rows, columns, strict=True) if scores[r, c] > 0}
+
+
+def _overlap(
+    last: Frame, frame: Frame, T: NDArray[np.float64], old: int, new: int, config: TrackConfig
+) -> float:
+    """Share of the old object's points that fall on the new mask; 0 where it is too little."""
+    points = transform_points(T, last.object_points(old))
+    if not len(points):
+        return 0.0
+    ids = at_pixels(points, frame.segmap, frame)
+    hits = float((ids == new).sum()) / len(points)
+    return hits if hits >= config.overlap else 0.0
+
+
+def _alike(
+    last: Frame, frame: Frame, T: NDArray[np.float64], old: int, new: int, config: TrackConfig
+) -> float:
+    """1 where the new object stands on the old one's place and looks as it did, down to 0."""
+    before, now = last.segmap == old, frame.segmap == new
+    points, seen = transform_points(T, last.object_points(old)), frame.object_points(new)
+    if not len(points) or not len(seen):
+        return 0.0
+    way = float(np.linalg.norm(np.median(points, axis=0) - np.median(seen, axis=0)))
+    colour = np.abs(last.rgb[before].mean(axis=0) - frame.rgb[now].mean(axis=0)).mean()
+    growth = max(before.sum(), now.sum()) / min(before.sum(), now.sum())
+    if way > config.reach or colour > config.colour or growth > config.growth:
+        return 0.0
+    return float((1 - way / config.reach) * (1 - colour / config.colour)) + 1e-9
