@@ -15,9 +15,10 @@ from brrp_cli.errors import ResultError
 from brrp_cli.geometry import IMAGE_UP, similarity, transform_points
 from brrp_cli.observation.support_plane import Plane
 from brrp_cli.planning.body import Body, body_axes, body_pose, mass_and_inertia
+from brrp_cli.planning.decompose import Solid, parts_of
 from brrp_cli.planning.mjcf import Table
 from brrp_cli.planning.options import PlanOptions
-from brrp_cli.planning.parts import convex_parts
+from brrp_cli.reconstruction import Surface
 from brrp_cli.results.read import StoredResult
 from brrp_cli.segmentation.furniture import Furniture, furniture, segmentation_of
 from brrp_cli.surface.confidence import ConfidenceSurface, confidence_surface
@@ -43,37 +44,59 @@ def planned_objects(stored: StoredResult, options: PlanOptions) -> Iterator[Plan
 
     Errors: ResultError where a mesh encloses nothing; DependencyError without CoACD.
     """
-    T_frame_cam = stored.T_frame_cam
-    axes = body_axes(upwards(stored), T_frame_cam[:3, 0])
-    for object_id, surface in stored.surfaces.items():
-        mesh = surface.as_trimesh()
-        if not mesh.is_watertight or mesh.volume <= 0:
-            raise ResultError(
-                "A mesh of the results encloses nothing",
-                where=stored.folder / f"object {object_id}",
-                fix="run `brrp reconstruct` again",
-            )
-        region = None
-        if options.confidence is not None:
-            region = _region(stored, object_id, options.confidence, options.margin)
-        T_frame_body = body_pose(mesh, axes)
-        T_body_frame = np.linalg.inv(T_frame_body)
-        local = mesh.copy().apply_transform(T_body_frame)
-        collision = local if region is None else _as_mesh(region, T_body_frame @ T_frame_cam)
-        vertices = np.asarray(collision.vertices, dtype=np.float64)
-        faces = np.asarray(collision.faces, dtype=np.int64)
-        mass, inertia = mass_and_inertia(local, options.density)
+    shapes = [_shape(stored, i, surface, options) for i, surface in stored.surfaces.items()]
+    solids = [
+        Solid(
+            str(stored.folder / f"object {shape.object_id}"),
+            np.asarray(shape.collision.vertices, dtype=np.float64),
+            np.asarray(shape.collision.faces, dtype=np.int64),
+        )
+        for shape in shapes
+    ]
+    found = parts_of(solids, options.collision, options.seed)
+    for shape, parts in zip(shapes, found, strict=True):
+        mass, inertia = mass_and_inertia(shape.local, options.density)
         body = Body(
-            name=f"object_{object_id}",
-            T_frame_body=T_frame_body,
-            mesh=local,
-            collision=collision,
-            parts=convex_parts(vertices, faces, options.collision, options.seed),
+            name=f"object_{shape.object_id}",
+            T_frame_body=shape.T_frame_body,
+            mesh=shape.local,
+            collision=shape.collision,
+            parts=parts,
             mass=mass,
             inertia=inertia,
-            colour=_colour(stored, object_id),
+            colour=_colour(stored, shape.object_id),
         )
-        yield PlannedObject(object_id, body, region)
+        yield PlannedObject(shape.object_id, body, shape.region)
+
+
+@dataclass(frozen=True)
+class _Shape:
+    """An object's mesh, and what its collision shape is made of, both in the body's frame."""
+
+    object_id: int
+    T_frame_body: NDArray[np.float64]
+    local: trimesh.Trimesh
+    collision: trimesh.Trimesh
+    region: ConfidenceSurface | None
+
+
+def _shape(stored: StoredResult, object_id: int, surface: Surface, options: PlanOptions) -> _Shape:
+    mesh = surface.as_trimesh()
+    if not mesh.is_watertight or mesh.volume <= 0:
+        raise ResultError(
+            "A mesh of the results encloses nothing",
+            where=stored.folder / f"object {object_id}",
+            fix="run `brrp reconstruct` again",
+        )
+    region = None
+    if options.confidence is not None:
+        region = _region(stored, object_id, options.confidence, options.margin)
+    T_frame_cam = stored.T_frame_cam
+    T_frame_body = body_pose(mesh, body_axes(upwards(stored), T_frame_cam[:3, 0]))
+    T_body_frame = np.linalg.inv(T_frame_body)
+    local = mesh.copy().apply_transform(T_body_frame)
+    collision = local if region is None else _as_mesh(region, T_body_frame @ T_frame_cam)
+    return _Shape(object_id, T_frame_body, local, collision, region)
 
 
 def upwards(stored: StoredResult) -> NDArray[np.float64]:
