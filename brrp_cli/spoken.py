@@ -26,3 +26,8 @@ def option(name: str, value: object = None) -> str:
         typed = "--" + name.replace("_", "-")
         return typed if value is None else f"{typed} {value}"
     return name if value is None else f"{name}={value}"
+
+
+def counted(number: int, noun: str) -> str:
+    """`1 object`, `2 objects`."""
+    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import io
-import json
 import re
 import time
 from collections.abc import Callable
@@ -14,16 +13,26 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from brrp_cli.commands.frames_summary import (
+    SUMMARY,
+    earlier_frames,
+    join_poses,
+    plain,
+    write_summary,
+)
 from brrp_cli.errors import BrrpError, FrameError, OutputError, ResultError, unexpected
 from brrp_cli.progress import hushed, note, only_bar, say
+from brrp_cli.spoken import counted
 
 if TYPE_CHECKING:
+    from brrp_cli.commands.beside import Beside
     from brrp_cli.commands.made_masks import MadeMasks
     from brrp_cli.commands.object_table import Told
     from brrp_cli.commands.source_options import SourceOptions
     from brrp_cli.frames.frame import Frame
+    from brrp_cli.results.read import StoredResult
 
-SUMMARY = "frames.json"
+SHOWN = 5  # settings that differ
 DONE, FAILED, SKIPPED = "done", "failed", "was there"
 
 
@@ -54,12 +63,14 @@ class Work:
 
     with_masks : (frame, its folder) -> the frame with masks, and how they were made
     one : (frame, how, its folder) -> what is told of its objects, once all is written
+    beside : what is written beside the results, also of frames that were there
     settings : what decides the result, as result.json holds it
     """
 
     source: SourceOptions
     with_masks: Callable[[Frame, Path], tuple[Frame, MadeMasks | None]]
     one: Callable[[Frame, MadeMasks | None, Path], list[Told]]
+    beside: Beside
     settings: dict[str, Any]
     overwrite: bool
 
@@ -102,36 +113,59 @@ def run_many(work: Work, frames: slice, output: Path, report: dict[str, Any]) ->
     if not chosen:
         raise click.UsageError(f"--frames chooses none of the {len(every)} frames of the source")
     folders = _folders(chosen, output)
-    todo = {name for name in chosen if work.overwrite or not _is_done(folders[name], work.settings)}
-    if len(todo) < len(chosen):
-        note(f"{len(chosen) - len(todo)} of {len(chosen)} frames were there and are left")
+    done = {
+        name: stored
+        for name in chosen
+        if not work.overwrite and (stored := _done(folders[name], work.settings)) is not None
+    }
+    if done:
+        note(f"{len(done)} of {len(chosen)} frames were there and are left")
+    source = str(work.source.path)
+    earlier = earlier_frames(output, source, work.settings)
     told: list[dict[str, Any]] = [
-        {"frame": name, "folder": folders[name].name, "status": SKIPPED} for name in chosen
+        earlier.get(name, {}) | {"frame": name, "folder": folders[name].name, "status": SKIPPED}
+        if name in done
+        else {"frame": name, "folder": folders[name].name, "status": SKIPPED}
+        for name in chosen
     ]
     report["frames"] = told
-    write_summary(work, output, told)
+    # What earlier calls told of other frames of the source stays.
+    here = {each["frame"]: each for each in told}
+    summary = [here.get(name) or earlier[name] for name in every if name in here or name in earlier]
+    write_summary(output, source, work.settings, summary)
     failed = False
     with ExitStack() as stack:
-        step = stack.enter_context(only_bar(len(todo), "frames"))
+        step = stack.enter_context(only_bar(len(told) - len(done), "frames"))
         first = True
         for about in told:
-            if about["frame"] not in todo:
+            name = about["frame"]
+            if name in done:
+                _complete(work, name, done[name])
                 continue
-            failed |= _frame(work, about, folders[about["frame"]])
+            failed |= _frame(work, about, folders[name])
             step()
             if first:  # what holds for every frame has been noted once
                 stack.enter_context(hushed())
                 first = False
-    write_summary(work, output, told)
-    _join_poses(output, list(folders.values()))
+    write_summary(output, source, work.settings, summary)
+    join_poses(output, summary, every)
     count = {status: sum(a["status"] == status for a in told) for status in (DONE, FAILED, SKIPPED)}
     say(
-        f"Wrote {count[DONE]} of {len(chosen)} frames"
+        f"Wrote {count[DONE]} of {counted(len(chosen), 'frame')}"
         + (f", {count[SKIPPED]} were there" if count[SKIPPED] else "")
         + (f", {count[FAILED]} failed" if count[FAILED] else "")
         + f": {output}/ (FRAME/ as of one frame, {SUMMARY})"
     )
     return failed
+
+
+def _complete(work: Work, name: str, stored: StoredResult) -> None:
+    """What is asked for beside the results of a frame that was there, and is not there yet."""
+    lacking = work.beside.lacking(stored)
+    if lacking:
+        with redirect_stdout(io.StringIO()):
+            work.beside.write(stored, lacking)
+        say(f"  {name}: was there; new: {', '.join(lacking)}")
 
 
 def _frame(work: Work, about: dict[str, Any], folder: Path) -> bool:
@@ -194,54 +228,49 @@ def _folders(names: list[str], output: Path) -> dict[str, Path]:
     return folders
 
 
-def _is_done(folder: Path, settings: dict[str, Any]) -> bool:
-    """Whether the results of a frame are there. Errors: OutputError where other settings made
+def _done(folder: Path, settings: dict[str, Any]) -> StoredResult | None:
+    """The results of a frame, where they are there. Errors: OutputError where other settings made
     them."""
     if not folder.exists():
-        return False
+        return None
     from brrp_cli.api import open_result
 
     try:
-        record = open_result(folder).record
+        stored = open_result(folder)
     except ResultError:
-        return False
+        return None
+    record = stored.record
     prior = record.get("prior")
     found = {key: record.get(key) for key in settings}
     found["prior"] = prior.get("digest") if isinstance(prior, dict) else None
-    wanted = json.loads(json.dumps(settings))
+    wanted = plain(settings)
     if found["segmentation"] is None:  # its masks came with it
         found["segmentation"] = wanted["segmentation"]
-    different = [key for key in settings if found[key] != wanted[key]]
+    one, other = _flat(wanted), _flat(found)
+    different = sorted(key for key in one.keys() | other.keys() if one.get(key) != other.get(key))
     if different:
         raise OutputError(
             "A frame was reconstructed with other settings before",
             where=folder,
-            expected=_shown(wanted, different),
-            found=_shown(found, different),
+            expected=_shown(one, different),
+            found=_shown(other, different),
             fix="choose another folder with -o, or pass --overwrite to do all frames again",
         )
-    return True
+    return stored
+
+
+def _flat(settings: dict[str, Any], above: str = "") -> dict[str, Any]:
+    """Values by dotted names."""
+    flat: dict[str, Any] = {}
+    for key, value in settings.items():
+        if isinstance(value, dict):
+            flat |= _flat(value, f"{above}{key}.")
+        else:
+            flat[f"{above}{key}"] = value
+    return flat
 
 
 def _shown(settings: dict[str, Any], keys: list[str]) -> str:
-    tables = ("config", "segmentation")
-    return ", ".join(key if key in tables else f"{key} {settings[key]}" for key in keys)
-
-
-def write_summary(work: Work, output: Path, told: list[dict[str, Any]]) -> None:
-    """frames.json: what became of every frame. Errors: OutputError."""
-    from brrp_cli.files import write_bytes
-
-    table = {"source": str(work.source.path), "settings": work.settings, "frames": told}
-    write_bytes(output / SUMMARY, (json.dumps(table, indent=1) + "\n").encode())
-
-
-def _join_poses(output: Path, folders: list[Path]) -> None:
-    """One BOP results file of all frames that have one."""
-    from brrp_cli.commands.reconstruct import POSES
-    from brrp_cli.files import write_bytes
-
-    texts = [(f / POSES).read_text().splitlines() for f in folders if (f / POSES).is_file()]
-    if texts:
-        rows = [texts[0][0], *(row for text in texts for row in text[1:])]
-        write_bytes(output / POSES, ("\n".join(rows) + "\n").encode())
+    shown = [f"{key} {settings[key]}" if key in settings else f"no {key}" for key in keys[:SHOWN]]
+    more = len(keys) - SHOWN
+    return ", ".join(shown) + (f", and {more} more" if more > 0 else "")

@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from brrp_cli.commands.export import CONFIDENCE, check_libraries, export
-from brrp_cli.commands.grasp import GRIPPER_HELP, JSON, grasp
+from brrp_cli.commands.beside import POSES, Beside
+from brrp_cli.commands.export import CONFIDENCE, check_libraries
+from brrp_cli.commands.grasp import GRIPPER_HELP
 from brrp_cli.commands.json_option import json_option, report_of
 from brrp_cli.commands.made_masks import MadeMasks, make_masks, masks_of, tell_mended
 from brrp_cli.commands.many_frames import Work, check_many, frame_slice, run_many
@@ -27,8 +28,7 @@ from brrp_cli.commands.object_table import Told, lines, told
 from brrp_cli.commands.retriever_option import RetrieverName
 from brrp_cli.commands.seed_option import SEED, SEED_HELP, device_option
 from brrp_cli.commands.source_options import SourceOptions, source_options
-from brrp_cli.commands.view import PAGE, title, view
-from brrp_cli.files import atomic_path
+from brrp_cli.commands.view import PAGE
 from brrp_cli.grasping.gripper_file import DEFAULT as DEFAULT_HAND
 from brrp_cli.grasping.gripper_file import open_gripper
 from brrp_cli.grasping.record import RECORD
@@ -50,7 +50,6 @@ if TYPE_CHECKING:
     from brrp_cli.retrieval.base import Retriever
 
 SOME_FAILED = 3
-POSES = "poses_bop.csv"
 NO_COLLISION = "none"
 
 
@@ -200,7 +199,6 @@ def command(
     from brrp_cli.methods.config_file import read_config
     from brrp_cli.methods.configuration import as_record
     from brrp_cli.methods.shared_work import started_later
-    from brrp_cli.results.bop import bop_csv
     from brrp_cli.results.write import check_output, write_results
     from brrp_cli.retrieval.base import one_image
 
@@ -251,6 +249,16 @@ def command(
     run: Callable[..., Reconstruction] = partial(reconstruct, **given)
     again = Again(run, partial(try_masks, **given))
 
+    beside = Beside(
+        poses=poses is not None,
+        names=[] if prior is None else prior.names,
+        plan=None if collision == NO_COLLISION else PlanOptions(collision, confidence, seed=seed),
+        hand=hand,
+        page=html or open_it,
+        open_it=open_it,
+        seed=seed,
+    )
+
     def one(frame: Frame, masks: MadeMasks | None, output: Path) -> list[Told]:
         """Reconstruct a frame, write it all, and say what was written."""
         with one_image(retrieval):
@@ -266,7 +274,6 @@ def command(
         write_results(result, output, frame=coordinates, overwrite=overwrite)
         table = told(result)
         done = len(result.reconstructed)
-        recognised = sum(item.recognised is not None for item in result.objects)
         for line in lines(table):
             click.echo(line)
         meshes = "object_*.ply, scene.glb, " if done else "no mesh: result.json says why; "
@@ -274,17 +281,7 @@ def command(
             f"Wrote {done} of {len(result.objects)} objects, metres, {coordinates} frame:"
             f" {output}/ ({meshes}posterior.h5, result.json, preview.png)"
         )
-        if poses is not None:
-            with atomic_path(output / POSES) as path:
-                path.write_text(bop_csv(result, [] if prior is None else prior.names))
-            click.echo(f"Wrote the poses of {recognised} recognised objects: {output / POSES}")
-        if done and collision != NO_COLLISION:
-            options = PlanOptions(collision, confidence, seed=seed)
-            export(open_result(output), None, options, overwrite=False)
-        if done and hand is not None:
-            grasp(open_result(output), hand, output / RECORD, JSON, seed=seed)
-        if html or open_it:
-            view(open_result(output), title(output), output / PAGE, open_it=open_it)
+        beside.write(open_result(output))
         return table
 
     with report_of(as_json) as report:
@@ -300,7 +297,7 @@ def command(
                 "config": as_record(config),
                 "segmentation": asdict(mask_config),
             }
-            work = Work(source, with_masks, one, settings, overwrite=overwrite)
+            work = Work(source, with_masks, one, beside, settings, overwrite=overwrite)
             failed = run_many(work, frames, output, report)
         else:
             table = one(seen, masks, output)

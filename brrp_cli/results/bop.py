@@ -10,16 +10,18 @@ from __future__ import annotations
 import csv
 import io
 import re
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
-from brrp_cli.reconstruction import Reconstruction
+import numpy as np
 
 HEADER = ("scene_id", "im_id", "obj_id", "score", "R", "t", "time")
 # The numbers that the YCB-Video data set gives to YCB objects.
 YCBV = (2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 19, 21, 24, 25, 35, 36, 37, 40, 51, 52, 61)
 
 
-def bop_id(name: str, names: list[str]) -> int:
+def bop_id(name: str, names: Sequence[str]) -> int:
     """The number of an object: of `obj_000012` 12, of a YCB object of YCB-Video its number there,
     of others their place, from 1, among the prior's names."""
     given = re.fullmatch(r"obj_0*(\d+)", name)
@@ -38,34 +40,44 @@ def image_ids(source: Path | None) -> tuple[int, int]:
     return scene, image
 
 
-def bop_rows(result: Reconstruction, names: list[str]) -> list[tuple[str, ...]]:
-    """One row for each recognised object; the score is the weight of the placement's object."""
-    scene, image = image_ids(result.frame.source)
-    seconds = sum(result.seconds.values()) + sum(sum(o.seconds.values()) for o in result.objects)
+def bop_rows(record: Mapping[str, Any], names: Sequence[str]) -> list[tuple[str, ...]]:
+    """One row for each recognised object; the score is the weight of the placement's object.
+
+    record : result.json; names : of the prior's objects
+    """
+    source = record["source"]
+    scene, image = image_ids(None if source is None else Path(source))
+    objects = record["objects"]
+    seconds = sum(sum(each["seconds"].values()) for each in [record, *objects])
     rows: list[tuple[str, ...]] = []
-    for item in result.objects:
-        found = item.recognised
-        if found is None or found.T_cam_mesh is None:
+    for item in objects:
+        placed = [
+            each
+            for each in item["retrieved"]
+            if each["name"] == item["recognised"] and each["T_cam_mesh"] is not None
+        ]
+        if not placed:
             continue
-        R, t = found.T_cam_mesh[:3, :3], found.T_cam_mesh[:3, 3] * 1000
+        found = max(placed, key=lambda each: each["weight"] or 0.0)
+        T_cam_mesh = np.asarray(found["T_cam_mesh"])
         rows.append(
             (
                 str(scene),
                 str(image),
-                str(bop_id(found.name, names)),
-                f"{found.weight or found.probability:.4f}",
-                " ".join(f"{value:.9f}" for value in R.ravel()),
-                " ".join(f"{value:.6f}" for value in t),
+                str(bop_id(found["name"], names)),
+                f"{found['weight'] or found['probability']:.4f}",
+                " ".join(f"{value:.9f}" for value in T_cam_mesh[:3, :3].ravel()),
+                " ".join(f"{value:.6f}" for value in T_cam_mesh[:3, 3] * 1000),
                 f"{seconds:.4f}",
             )
         )
     return rows
 
 
-def bop_csv(result: Reconstruction, names: list[str]) -> str:
-    """The file's text."""
+def bop_csv(record: Mapping[str, Any], names: Sequence[str]) -> str:
+    """The file's text; arguments as for `bop_rows`."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(HEADER)
-    writer.writerows(bop_rows(result, names))
+    writer.writerows(bop_rows(record, names))
     return text.getvalue()

@@ -15,7 +15,8 @@ from sphere_method import METHOD
 from table_scene import T_CAM_WORLD, in_camera, photograph
 
 from brrp_cli.cli import main
-from brrp_cli.commands.many_frames import _is_done
+from brrp_cli.commands.frames_summary import join_poses
+from brrp_cli.commands.many_frames import _done
 from brrp_cli.config.segmentation import SegmentConfig
 from brrp_cli.errors import OutputError
 from brrp_cli.frames.npz import load_frame, save_frame
@@ -94,7 +95,7 @@ def test_masks_that_were_made_otherwise_are_other_settings(tmp_path):
 
     def with_masks(made):
         (folder / "result.json").write_text(json.dumps(record | {"segmentation": made}))
-        return _is_done(folder, settings)
+        return _done(folder, settings) is not None
 
     assert with_masks(None) and with_masks(settings["segmentation"])
     with pytest.raises(OutputError, match="other settings"):
@@ -161,3 +162,61 @@ def test_list_says_what_a_source_holds_and_writes_nothing(command, source):
     assert sorted(source.parent.iterdir()) == before
     none = CliRunner().invoke(main, [command, "--list"])
     assert none.exit_code == 2 and "SOURCE" in none.output
+
+
+def test_what_is_asked_for_later_is_written_beside_what_was_there(source, tmp_path):
+    out = tmp_path / "out"
+    assert run(source, "--frames", ":2", "-o", out).exit_code == 0
+    before = {p: p.stat().st_mtime_ns for p in out.rglob("*.ply")}
+    asked = ["--frames", ":2", "-o", out, "--html", "--collision", "hull", "--grasp"]
+    again = run(source, *asked)
+    assert again.exit_code == 0, again.output
+    for name in ("f0.npz", "f1.npz"):
+        for written in ("view.html", "grasps.json", "plan/plan.json"):
+            assert (out / name / written).is_file()
+        assert f"{name}: was there; new: plan/plan.json, grasps.json, view.html" in again.stdout
+    assert {p: p.stat().st_mtime_ns for p in before} == before
+    assert "new:" not in run(source, *asked).stdout
+
+    other = run(source, *asked, "--gripper", "robotiq-2f-85", "--confidence", 0.9)
+    assert "f0.npz: was there; new: plan/plan.json, grasps.json, view.html" in other.stdout
+    hand = json.loads((out / "f0.npz" / "grasps.json").read_text())["gripper"]["name"]
+    assert hand == "Robotiq 2F-85"
+    assert json.loads((out / "f0.npz" / "plan" / "plan.json").read_text())["confidence"] == 0.9
+
+
+def test_what_was_told_of_other_frames_stays(source, tmp_path):
+    out = tmp_path / "out"
+    assert run(source, "--frames", "3:", "-o", out).exit_code == 0
+    assert run(source, "--frames", ":1", "-o", out).exit_code == 0
+    told = json.loads((out / "frames.json").read_text())["frames"]
+    assert [each["frame"] for each in told] == ["f0.npz", "f3.npz"]
+    assert all(each["status"] == "done" and each["objects"] for each in told)
+    assert run(source, "--frames", ":1", "-o", out).exit_code == 0
+    there = json.loads((out / "frames.json").read_text())["frames"][0]
+    assert there == told[0] | {"status": "was there"}
+
+
+def test_poses_of_frames_that_are_named_by_words_have_images_of_their_own(tmp_path):
+    header, row = "scene_id,im_id,obj_id,score,R,t,time", "0,0,4,0.9,1 0 0,1 2 3,0.5"
+    names = ["a", "b", "c"]
+    for name in ("a", "c"):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "poses_bop.csv").write_text(f"{header}\n{row}\n{row}\n")
+    told = [{"frame": name, "folder": name} for name in names]
+    join_poses(tmp_path, told, names)
+    lines = (tmp_path / "poses_bop.csv").read_text().splitlines()
+    assert lines == [header, *[row] * 2, *[row.replace("0,0,", "0,2,", 1)] * 2]
+
+
+def test_settings_that_differ_are_named_with_their_values(source, tmp_path):
+    out = tmp_path / "out"
+    assert run(source, "--frames", ":1", "-o", out).exit_code == 0
+    path = out / "f0.npz" / "result.json"
+    record = json.loads(path.read_text())
+    made = asdict(SegmentConfig())
+    made["table"]["tolerance"] = 0.5
+    path.write_text(json.dumps(record | {"segmentation": made}))
+    result = run(source, "--frames", ":1", "-o", out)
+    assert result.exit_code == 1
+    assert "found:    segmentation.table.tolerance 0.5" in result.output

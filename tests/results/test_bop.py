@@ -9,6 +9,7 @@ import pytest
 
 from brrp_cli.geometry import similarity
 from brrp_cli.results.bop import bop_csv, bop_id, image_ids
+from brrp_cli.results.write import result_record
 
 
 @pytest.mark.parametrize(
@@ -31,7 +32,11 @@ def test_scene_and_image_come_from_the_path() -> None:
 
 
 def test_a_row_for_each_recognised_object(made_reconstruction) -> None:
-    rows = list(csv.DictReader(io.StringIO(bop_csv(made_reconstruction, ["can", "mug"]))))
+    rows = list(
+        csv.DictReader(
+            io.StringIO(bop_csv(result_record(made_reconstruction, "camera"), ["can", "mug"]))
+        )
+    )
     assert [row["obj_id"] for row in rows] == ["2"]
     R = np.array(rows[0]["R"].split(), dtype=float).reshape(3, 3)
     np.testing.assert_allclose(R @ R.T, np.eye(3), atol=1e-6)
