@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from brrp_cli.api import reconstruct as reconstruct
     from brrp_cli.config import preset as preset
     from brrp_cli.errors import BrrpError as BrrpError
+    from brrp_cli.errors import FrameError as FrameError
     from brrp_cli.frames.build import make_frame as make_frame
     from brrp_cli.frames.npz import load_frame as load_frame
     from brrp_cli.frames.readers import read_frame as read_frame
@@ -32,6 +33,7 @@ if TYPE_CHECKING:
 # Names are imported when they are used, so that `brrp --help` does not wait for torch.
 _HOMES = {
     "BrrpError": "brrp_cli.errors",
+    "FrameError": "brrp_cli.errors",
     "Reconstruction": "brrp_cli.reconstruction",
     "Reconstructor": "brrp_cli.session",
     "load_config": "brrp_cli.methods.config_file",

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from brrp_cli.config.registration import TrialConfig
 from brrp_cli.errors import BrrpError
+from brrp_cli.frames.build import require_objects
 from brrp_cli.frames.frame import Frame
 from brrp_cli.methods.base import Method, Setup, Stream, Trial
 from brrp_cli.methods.configuration import MethodConfig
@@ -66,10 +67,13 @@ def reconstruct(
     An object that cannot be reconstructed gets a status; the others still are. The frame is never
     changed. The same seed gives the same result, whatever the number of workers.
 
-    Errors: BrrpError for an unknown method, or a prior, retriever, weights or configuration that
-    it lacks or cannot use; PriorError for a shard that is damaged, when an object is read from it.
+    Errors: FrameError for a frame without masks; BrrpError for an unknown method, or a prior,
+    retriever, weights or configuration that it lacks or cannot use; PriorError for a shard that is
+    damaged, when an object is read from it.
     """
     start = time.perf_counter()
+    if only is None:
+        require_objects(frame)
     chosen = reconstructing_method(method)
     setup = _setup(
         chosen,

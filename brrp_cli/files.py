@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from brrp_cli.errors import OutputError
+from brrp_cli.spoken import either
 
 # What file systems without such a thing say.
 _NOT_SUPPORTED = {errno.EINVAL, errno.ENOSYS, errno.ENOTSUP}
@@ -138,7 +139,10 @@ def refuse_existing(path: Path, *, overwrite: bool) -> None:
         raise OutputError(
             "The output exists already",
             where=path,
-            fix="pass --overwrite to replace it, or choose another place with -o",
+            fix=either(
+                "pass --overwrite to replace it, or choose another place with -o",
+                "pass overwrite=True to replace it, or choose another place",
+            ),
         )
 
 

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from brrp_cli.frames.frame import Frame
 from brrp_cli.observation.support_plane import Plane
+from brrp_cli.spoken import counted
 
 if TYPE_CHECKING:
     import h5py
@@ -299,7 +300,7 @@ class Reconstruction:
         source = self.frame.source
         name = "a frame" if source is None else source.name
         by = f"retrieved by {self.retriever}" if self.retriever else "no prior"
-        made = f"{len(self.reconstructed)} of {len(self.objects)} objects of {name}"
+        made = f"{len(self.reconstructed)} of {counted(len(self.objects), 'object')} of {name}"
         return f"{made}; {self.method}, {by}, seed {self.seed}"
 
     def __repr__(self) -> str:

@@ -28,6 +28,11 @@ def option(name: str, value: object = None) -> str:
     return name if value is None else f"{name}={value}"
 
 
+def either(command: str, python: str) -> str:
+    """Advice in the words of the command line where it was used, else in Python's."""
+    return command if _TYPED.get() else python
+
+
 def counted(number: int, noun: str) -> str:
     """`1 object`, `2 objects`."""
     return f"{number} {noun}" if number == 1 else f"{number} {noun}s"

@@ -153,6 +153,6 @@ def test_quiet_leaves_results_and_errors_alone(tmp_path: Path) -> None:
     assert both.exit_code == 2 and "exclude each other" in both.stderr
     assert "Prior:" in loud.stderr
     assert quiet.stderr == after.stderr == ""
-    assert quiet.stdout.startswith("1 objects (1 made")
+    assert quiet.stdout.startswith("1 object (1 made")
     failed = CliRunner().invoke(main, ["-q", "info", str(tmp_path / "nothing")])
     assert failed.exit_code == 1 and "Error:" in failed.stderr

@@ -18,6 +18,7 @@ from brrp_cli.files import atomic_path, parse_json
 from brrp_cli.grasping.record import RECORD as GRASPS
 from brrp_cli.planning.options import PlanOptions
 from brrp_cli.progress import note
+from brrp_cli.spoken import counted
 
 if TYPE_CHECKING:
     from brrp_cli.grasping.gripper import Gripper
@@ -81,8 +82,7 @@ class Beside:
 
         with atomic_path(stored.folder / POSES) as path:
             path.write_text(bop_csv(stored.record, self.names))
-        count = len(bop_rows(stored.record, self.names))
-        poses = f"{count} pose{'' if count == 1 else 's'}"
+        poses = counted(len(bop_rows(stored.record, self.names)), "pose")
         click.echo(f"Wrote {poses} of recognised objects: {stored.folder / POSES}")
 
 

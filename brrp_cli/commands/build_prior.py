@@ -15,6 +15,7 @@ from brrp_cli.prior.locate import output_prior
 from brrp_cli.prior.parameters import UNITS, BuildParameters
 from brrp_cli.progress import note, quiet
 from brrp_cli.retrieval.clip.model_files import clip_folder
+from brrp_cli.spoken import counted
 
 if TYPE_CHECKING:
     from brrp_cli.prior.manifest import Manifest
@@ -93,8 +94,9 @@ def command(
         click.echo(f"no longer among the meshes, so removed: {', '.join(report.removed)}", err=True)
     size = sum(shard.bytes for shard in manifest.shards) / 1e6
     click.echo(
-        f"{len(manifest.objects)} objects ({len(report.made)} made, {len(report.kept)} kept, "
-        f"{len(manifest.failed)} failed) in {len(manifest.shards)} shards, {size:.1f} MB, "
+        f"{counted(len(manifest.objects), 'object')} ({len(report.made)} made,"
+        f" {len(report.kept)} kept, {len(manifest.failed)} failed)"
+        f" in {counted(len(manifest.shards), 'shard')}, {size:.1f} MB, "
         f"written to {report.path}"
     )
     keep_descriptions(report.path, clip_dir)

@@ -16,6 +16,7 @@ from brrp_cli.commands.object_table import told
 from brrp_cli.commands.seed_option import SEED, device_option
 from brrp_cli.methods.registry import DEFAULT, METHODS
 from brrp_cli.progress import note
+from brrp_cli.spoken import counted
 
 if TYPE_CHECKING:
     import trimesh
@@ -90,7 +91,7 @@ def command(
     scene = make_scene(seed)
     config = METHODS[DEFAULT].preset(preset_name)
     retriever = choose_retriever("auto", prior, config, seed)
-    note(f"Scene: seed {seed}, {len(scene.truth)} objects. Retrieval: {retriever.name}")
+    note(f"Scene: seed {seed}, {counted(len(scene.truth), 'object')}. Retrieval: {retriever.name}")
     result = reconstruct(
         scene.frame, prior, config=config, retriever=retriever, seed=seed, device=device
     )
@@ -107,8 +108,8 @@ def command(
     with report_of(as_json) as record:
         report(result, scene, scores, set(prior.names))
         click.echo(
-            f"Wrote {len(result.reconstructed)} of {len(result.objects)} objects, metres, camera"
-            f" frame, in {time.perf_counter() - start:.0f} s: {output}/ (frame.npz,"
+            f"Wrote {len(result.reconstructed)} of {counted(len(result.objects), 'object')},"
+            f" metres, camera frame, in {time.perf_counter() - start:.0f} s: {output}/ (frame.npz,"
             " truth/object_*.ply, result/object_*.ply, result/scene.glb, result/preview.png)"
         )
         record["output"] = str(output)

@@ -25,6 +25,7 @@ from brrp_cli.methods.registry import COMPARED, METHODS, preset_names
 from brrp_cli.progress import note
 from brrp_cli.retrieval.choose import RETRIEVERS
 from brrp_cli.retrieval.clip.model_files import CLIP_DIR_VARIABLE
+from brrp_cli.spoken import counted
 
 SOME_FAILED = 3
 ABLATIONS = ("truth",)
@@ -210,8 +211,9 @@ def command(
                 first, in_3 = summary.figures["true_first"], summary.figures["true_in_3"]
                 figures = f"true object first {first.value:.3f}, among 3 {in_3.value:.3f}"
             click.echo(
-                f"  {result.labels[summary.variant]:<24} {figures}  {summary.objects} objects, "
-                f"{summary.failed} failed, {summary.empty} empty"
+                f"  {result.labels[summary.variant]:<24} {figures}"
+                f"  {counted(summary.objects, 'object')}, {summary.failed} failed,"
+                f" {summary.empty} empty"
             )
         click.echo(f"Wrote {request.output}/ ({', '.join(result.files)})")
         report["output"] = str(request.output)

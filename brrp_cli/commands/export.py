@@ -15,6 +15,7 @@ from brrp_cli.physics import DENSITY
 from brrp_cli.planning.options import PlanOptions
 from brrp_cli.planning.parts import COACD, HOW, check_available
 from brrp_cli.progress import note
+from brrp_cli.spoken import counted
 
 if TYPE_CHECKING:
     from brrp_cli.planning.scene import PlannedObject
@@ -149,10 +150,11 @@ def export(
         if options.confidence is None
         else f"that hold the objects with probability {options.confidence:g}"
     )
-    moveit = "" if options.moveit is None else "moveit.scene, moveit.json, "
+    names = ("moveit.scene", "moveit.json", "moveit_grasps.json")
+    moveit = "".join(f"{name}, " for name in names if (folder / name).is_file())
     click.echo(
-        f"Wrote collision shapes {shapes} ({options.collision}) of {len(record['objects'])} "
-        f"objects, metres, {record['frame']} frame: {folder}/ "
+        f"Wrote collision shapes {shapes} ({options.collision}) of"
+        f" {counted(len(record['objects']), 'object')}, metres, {record['frame']} frame: {folder}/ "
         f"(object_*.urdf, object_*.xml, scene.xml, world.yml, {moveit}scene.glb, plan.json)"
     )
     return record

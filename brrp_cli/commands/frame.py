@@ -10,6 +10,8 @@ import click
 from brrp_cli.commands.seed_option import SEED
 from brrp_cli.commands.source_options import SourceOptions, require_output, source_options
 from brrp_cli.errors import FrameError, OutputError
+from brrp_cli.progress import note
+from brrp_cli.spoken import counted
 
 
 @click.command("frame")
@@ -38,6 +40,8 @@ def command(
     makes_masks = segment or source.prompt is not None
     if source.masks is not None and segment:
         raise click.UsageError("--masks and --segment exclude each other")
+    if source.keep_all and not segment:
+        raise click.UsageError("--all is of masks that are made: add --segment")
     if segment and source.prompt is not None:
         raise click.UsageError("--segment uses no model: leave it out beside --prompt")
     output = require_output(output)
@@ -53,6 +57,9 @@ def command(
 
     frame = source.read()
     if makes_masks:
+        if frame.object_ids:
+            old = counted(len(frame.object_ids), "object")
+            note(f"Masks: those of the source, {old}, are replaced")
         frame = require_objects(source.make_masks(frame, seed))
         write_picture(frame, picture)
     elif not frame.object_ids and source.masks is None:
@@ -80,8 +87,7 @@ def refuse_existing(paths: list[Path], overwrite: bool) -> None:
 def tell(shape: tuple[int, int], objects: int, output: Path, picture: Path | None) -> None:
     """Say what was written and what to do with it."""
     beside = f"; look at {picture}" if picture is not None else ""
-    plural = "" if objects == 1 else "s"
     click.echo(
-        f"Wrote {output} ({shape[1]} x {shape[0]}, {objects} object{plural}){beside}."
+        f"Wrote {output} ({shape[1]} x {shape[0]}, {counted(objects, 'object')}){beside}."
         f" Next: brrp reconstruct {quote(str(output))}"
     )

@@ -16,6 +16,7 @@ from brrp_cli.grasping.layouts import LAYOUTS
 from brrp_cli.grasping.options import ALL, APPROACHES, MIN_SCORE, PER_OBJECT
 from brrp_cli.grasping.record import RECORD
 from brrp_cli.progress import note
+from brrp_cli.spoken import counted
 
 if TYPE_CHECKING:
     from brrp_cli.grasping.grasp import GraspPlan, ObjectGrasps
@@ -120,12 +121,13 @@ def command(
       brrp grasp out/ --gripper mine.yaml --format graspnet -o grasps/best.json
     """
     from brrp_cli.api import open_result
-    from brrp_cli.files import refuse_existing
+    from brrp_cli.files import check_writable, refuse_existing
 
     hand = open_gripper(gripper)
     for path in [] if output is None else files_of(output, layout):
         refuse_existing(path, overwrite=overwrite)
     stored = open_result(results)
+    check_writable((output or stored.folder / RECORD).parent)
     config = replace(
         GraspConfig(),
         friction=friction,
@@ -184,8 +186,9 @@ def grasp(
         note(f"  {paths[2].name} is in the camera frame, as its readers expect")
     written = ", ".join(str(path) for path in paths if path.exists())
     click.echo(
-        f"Wrote {len(plan.grasps)} grasps of {held} of {len(plan.objects)} objects with the "
-        f"{gripper.name}, metres, {frame} frame: {written}"
+        f"Wrote {counted(len(plan.grasps), 'grasp')} of {held} of"
+        f" {counted(len(plan.objects), 'object')} with the hand {gripper.name},"
+        f" metres, {frame} frame: {written}"
     )
     return plan
 
@@ -195,9 +198,8 @@ def told(each: ObjectGrasps) -> str:
     if not each.grasps:
         return f"object {each.object_id}: no grasp, {each.why}"
     best = each.grasps[0]
-    count = len(each.grasps)
     return (
-        f"object {each.object_id}: {count} grasp{'' if count == 1 else 's'}, the best"
+        f"object {each.object_id}: {counted(len(each.grasps), 'grasp')}, the best"
         f" holds with probability {best.score:.2f}, {best.width * 1000:.0f} mm wide"
     )
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from brrp_cli.prior.default import locate_prior
+from brrp_cli.spoken import counted
 
 if TYPE_CHECKING:
     from brrp_cli.prior.manifest import ObjectEntry
@@ -47,7 +48,10 @@ def command(prior: Path | None, as_json: bool) -> None:
     size = sum(shard.bytes for shard in manifest.shards) / 1e6
     parameters = opened.parameters
     click.echo(f"\n{folder} ({how})")
-    click.echo(f"{len(manifest.objects)} objects in {len(manifest.shards)} shards, {size:.1f} MB")
+    click.echo(
+        f"{counted(len(manifest.objects), 'object')} in"
+        f" {counted(len(manifest.shards), 'shard')}, {size:.1f} MB"
+    )
     click.echo(
         f"seed {parameters['seed']}, {parameters['samples']} samples an object, "
         f"units {parameters['units']}, {len(parameters['features']['scales'])} scales"

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 from brrp_cli.commands.frame import refuse_existing
 from brrp_cli.progress import note
+from brrp_cli.spoken import counted
 
 if TYPE_CHECKING:
     import numpy as np
@@ -49,7 +50,9 @@ def make_masks(
     frame = require_objects(source.make_masks(frame, seed, config))
     write_picture(frame, picture)
     how = f"the prompt {source.prompt!r}" if source.prompt else "what stands on the table"
-    note(f"Masks: made on the way from {how}, {len(frame.object_ids)} objects: {picture}")
+    note(
+        f"Masks: made on the way from {how}, {counted(len(frame.object_ids), 'object')}: {picture}"
+    )
     note(
         f"  to correct them: brrp segment {quote(str(output / 'frame.npz'))} --merge 1,2 --split 3"
         " --drop 4 -o NEW.npz"
@@ -80,8 +83,9 @@ def tell_mended(before: Frame, after: Frame, output: Path) -> None:
     write_picture(after, picture)
     pixels = int((before.segmap != after.segmap).sum())
     note(
-        f"Masks: mended by recognised objects in {pixels} pixels,"
-        f" {len(before.object_ids)} objects before, {len(after.object_ids)} after: {picture}"
+        f"Masks: mended by recognised objects in {counted(pixels, 'pixel')},"
+        f" {counted(len(before.object_ids), 'object')} before,"
+        f" {len(after.object_ids)} after: {picture}"
     )
 
 

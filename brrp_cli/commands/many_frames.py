@@ -210,7 +210,7 @@ def one_line(name: str, table: list[Told], seconds: float) -> str:
     made = sum(not each.failed for each in table)
     taken = [each.name for each in table if each.taken_for or each.how]
     warned = sum(bool(each.warnings) for each in table)
-    line = f"  {name}: {made} of {len(table)} objects, {seconds:.1f} s"
+    line = f"  {name}: {made} of {counted(len(table), 'object')}, {seconds:.1f} s"
     line += f": {', '.join(taken)}" if taken else ""
     return line + (f" ({warned} with warnings)" if warned else "")
 

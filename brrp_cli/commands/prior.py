@@ -14,6 +14,7 @@ from brrp_cli.errors import PriorError
 from brrp_cli.prior.default import locate_prior
 from brrp_cli.prior.locate import output_prior
 from brrp_cli.progress import note, quiet
+from brrp_cli.spoken import counted
 
 if TYPE_CHECKING:
     from brrp_cli.prior.build.build import BuildReport
@@ -92,7 +93,7 @@ def add(
         progress=not quiet(),
     )
     told_failures(report.manifest)
-    click.echo(f"{len(report.made)} objects made; {_total(report)}")
+    click.echo(f"{counted(len(report.made), 'object')} made; {_total(report)}")
     keep_descriptions(report.path, clip_dir)
     if report.manifest.failed:
         sys.exit(3)
@@ -113,7 +114,7 @@ def remove(names: tuple[str, ...], prior: Path | None) -> None:
     folder, how = output_prior(prior)
     note(f"Prior: {folder} ({how.replace('-o', '--prior')})")
     report = remove_objects(folder, names)
-    click.echo(f"{len(report.removed)} objects removed; {_total(report)}")
+    click.echo(f"{counted(len(report.removed), 'object')} removed; {_total(report)}")
     keep_descriptions(report.path, None)
 
 
@@ -161,7 +162,7 @@ def list_objects(prior: Path | None, as_json: bool) -> None:
         for name, phrase in report["objects"].items():
             if not as_json:
                 click.echo(f"{name}\t{phrase}")
-    note(f"{len(opened.names)} objects: {folder} ({how})")
+    note(f"{counted(len(opened.names), 'object')}: {folder} ({how})")
 
 
 @command.command("show")
@@ -246,6 +247,7 @@ def _total(report: BuildReport) -> str:
     manifest = report.manifest
     size = sum(shard.bytes for shard in manifest.shards) / 1e6
     return (
-        f"{len(manifest.objects)} objects now in {len(manifest.shards)} shards, {size:.1f} MB: "
+        f"{counted(len(manifest.objects), 'object')} now in"
+        f" {counted(len(manifest.shards), 'shard')}, {size:.1f} MB: "
         f"{report.path}"
     )

@@ -38,6 +38,7 @@ from brrp_cli.planning.parts import HOW
 from brrp_cli.progress import note
 from brrp_cli.retrieval.choose import RETRIEVERS, choose_retriever
 from brrp_cli.retrieval.clip.model_files import CLIP_DIR_VARIABLE
+from brrp_cli.spoken import counted
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -221,6 +222,11 @@ def command(
     def with_masks(frame: Frame, folder: Path) -> tuple[Frame, MadeMasks | None]:
         again = overwrite or frames is not None
         if source.prompt is None and frame.object_ids:
+            if source.keep_all:
+                raise click.UsageError(
+                    "--all is of masks that are made, and the frame has some:"
+                    " brrp segment SOURCE --again --all makes them anew"
+                )
             return masks_of(frame, folder, mask_config, overwrite=again)
         return make_masks(source, frame, folder, seed, mask_config, overwrite=again)
 
@@ -228,7 +234,7 @@ def command(
         seen, masks = with_masks(seen, output)
     prior, retrieval = open_prior_of(chosen, prior_path, config, retriever, clip_dir, seed)
     if prior is not None and k is not None and k > len(prior.names):
-        note(f"--k {k}: the prior holds {len(prior.names)} objects, all of them are taken")
+        note(f"--k {k}: all of the prior's {counted(len(prior.names), 'object')} are taken")
     if prior is None:
         own = chosen.own_weights
         used = weights or (own and f"{own.stem} (what comes with brrp)")
@@ -278,8 +284,8 @@ def command(
             click.echo(line)
         meshes = "object_*.ply, scene.glb, " if done else "no mesh: result.json says why; "
         click.echo(
-            f"Wrote {done} of {len(result.objects)} objects, metres, {coordinates} frame:"
-            f" {output}/ ({meshes}posterior.h5, result.json, preview.png)"
+            f"Wrote {done} of {counted(len(result.objects), 'object')}, metres,"
+            f" {coordinates} frame: {output}/ ({meshes}posterior.h5, result.json, preview.png)"
         )
         beside.write(open_result(output))
         return table
@@ -340,7 +346,7 @@ def open_prior_of(
 
     located, how = locate_prior(prior_path)
     prior = open_prior(located)
-    note(f"Prior: {located} ({how}), {len(prior.names)} objects")
+    note(f"Prior: {located} ({how}), {counted(len(prior.names), 'object')}")
     if not method.uses_retriever:
         return prior, None
     chosen = choose_retriever(retriever, prior, config, seed, clip_dir=clip_dir)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,6 +13,7 @@ from brrp_cli.commands.json_option import json_option, report_of
 from brrp_cli.commands.method_options import CONFIG_HELP
 from brrp_cli.commands.seed_option import SEED, SEED_HELP
 from brrp_cli.commands.source_options import SourceOptions, require_output, source_options
+from brrp_cli.progress import note
 
 if TYPE_CHECKING:
     from brrp_cli.frames.frame import Frame
@@ -68,8 +70,8 @@ def command(
 ) -> None:
     """Make masks, show them, and correct them by the ids that the picture shows.
 
-    A source that has masks keeps them unless --again, --prompt or --masks says otherwise. All ids
-    are those of the masks before any correction; --split comes first, then --merge, then --drop.
+    A source that has masks keeps them unless --again, --prompt or --masks says otherwise. --split
+    comes first, and the objects that it makes get the next free ids; then come --merge and --drop.
     Writes FRAME.npz, FRAME.masks.png to look at and FRAME.ids.png (16 bit) for other programs.
 
     \b
@@ -84,6 +86,9 @@ def command(
         raise click.UsageError(f"-o must end in .npz, not {output.name!r}")
     if any(len(ids) < 2 for ids in merges):
         raise click.UsageError("--merge takes two ids or more: --merge 3,4")
+    named = Counter(i for group in [*merges, *drops] for i in {*group})
+    if twice := [str(i) for i, times in named.items() if times > 1]:
+        raise click.UsageError(f"name an id in one --merge or --drop, not in two: {twice[0]}")
     picture, ids = output.with_suffix(".masks.png"), output.with_suffix(".ids.png")
     refuse_existing([output, picture, ids], overwrite)
 
@@ -91,12 +96,20 @@ def command(
     from brrp_cli.frames.build import require_objects
     from brrp_cli.frames.npz import save_frame
     from brrp_cli.methods.config_file import read_config
+    from brrp_cli.results.write import FRAME, RECORD
     from brrp_cli.segmentation import edit_masks
-    from brrp_cli.segmentation.mask_picture import write_ids, write_picture
+    from brrp_cli.segmentation.mask_picture import fits_ids, write_ids, write_picture
 
     config = SegmentConfig() if file is None else read_config(file).segmentation()
     frame = source.read()
-    if again or source.prompt is not None or not frame.object_ids:
+    made = again or source.prompt is not None or not frame.object_ids
+    unused = {"--all": source.keep_all, "--config": file is not None and not splits}
+    for option, given in unused.items():
+        if given and not made:
+            raise click.UsageError(
+                f"{option} is of masks that are made, and the source has some: add --again"
+            )
+    if made:
         frame = source.make_masks(frame, seed, config)
     before = frame
     for object_id, pieces in splits:
@@ -109,8 +122,14 @@ def command(
     with report_of(as_json) as report:
         report["objects"] = _report(require_objects(frame), before)
         write_picture(frame, picture)
-        write_ids(frame, ids)
+        if fits_ids(frame):
+            write_ids(frame, ids)
+        else:
+            ids.unlink(missing_ok=True)
+            note(f"{ids} is left out: 16 bits do not hold all ids")
         save_frame(frame, output)
+        if (output.parent / RECORD).is_file() and output.name == FRAME:
+            note(f"{output.parent}: the results beside it are of the masks before")
         tell(frame.shape, len(frame.object_ids), output, picture)
         report["output"] = str(output)
 

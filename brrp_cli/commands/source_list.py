@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from brrp_cli.spoken import counted
+
 if TYPE_CHECKING:
     from brrp_cli.commands.source_options import SourceOptions
 
@@ -27,8 +29,7 @@ def print_list(source: SourceOptions, *, as_json: bool) -> None:
         table: dict[str, Any] = {"source": str(source.path), "format": found.title}
         click.echo(json.dumps({**table, "frames": names, "contents": contents}, indent=1))
         return
-    plural = "" if len(names) == 1 else "s"
-    click.echo(f"{source.path}: {found.title}, {len(names)} frame{plural}")
+    click.echo(f"{source.path}: {found.title}, {counted(len(names), 'frame')}")
     for line in contents:
         click.echo(f"  {line}")
     numbered = [f"  {number:>5}  {name}" for number, name in enumerate(names)]

@@ -9,6 +9,7 @@ import click
 
 from brrp_cli.commands.json_option import json_option, report_of
 from brrp_cli.prior.default import locate_prior
+from brrp_cli.spoken import counted
 
 
 @click.command("verify")
@@ -30,7 +31,9 @@ def command(prior: Path | None, as_json: bool) -> None:
     folder, how = locate_prior(prior)
     opened = open_prior(folder)
     problems = verify_prior(opened)
-    counts = f"{len(opened.names)} objects in {len(opened.manifest.shards)} shards"
+    counts = (
+        f"{counted(len(opened.names), 'object')} in {counted(len(opened.manifest.shards), 'shard')}"
+    )
     with report_of(as_json) as report:
         for problem in problems:
             click.echo(problem)

@@ -23,6 +23,8 @@ _FOCAL = 0.05, 1000.0
 # A principal point that lies beyond the middle by one factor in both directions, this large and
 # with this tolerance, is that of a larger image, of which this one is a smaller copy.
 _LARGER, _ALIKE = 1.4, 0.05
+# Metres from the camera to the world's origin above which the unit of a pose is suspect.
+_FAR = 50.0
 _EXPECTED_K = "[[fx, 0, cx], [0, fy, cy], [0, 0, 1]], pixels, fx and fy > 0"
 
 
@@ -80,6 +82,17 @@ def check_intrinsics(
             width,
             height,
         )
+    if 0 < max(beyond) < 1 / _LARGER and abs(beyond[0] - beyond[1]) < _ALIKE * max(beyond):
+        log.warning(
+            "The principal point (%.1f, %.1f) is the middle of about %.0f x %.0f pixels, not of"
+            " %d x %d: if K is of a smaller image, objects come out too large",
+            K[0, 2],
+            K[1, 2],
+            2 * K[0, 2],
+            2 * K[1, 2],
+            width,
+            height,
+        )
     return K
 
 
@@ -100,6 +113,13 @@ def check_pose(T: NDArray[Any], source: Path | None) -> NDArray[np.float64]:
             expected="(4, 4): rotation, translation in metres, last row 0 0 0 1",
             found=np.array2string(T, separator=", ", precision=4).replace("\n", ""),
             fix=advice("T_world_cam", T) or "transpose it if it was written column by column",
+        )
+    away = float(np.linalg.norm(T[:3, 3]))
+    if away > _FAR:
+        log.warning(
+            "T_world_cam: the camera stands %.4g m from the world's origin, which is far for a"
+            " table: suspect the unit, which is metres",
+            away,
         )
     return T.astype(np.float64)
 

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brrp_cli.errors import FrameError
+from brrp_cli.spoken import counted
 
 BACKGROUND = 0
 
@@ -72,7 +73,7 @@ class Frame:
         """Sizes, without the arrays."""
         height, width = self.shape
         source = "" if self.source is None else f", {self.source}"
-        return f"Frame({width} x {height}, {len(self.object_ids)} objects{source})"
+        return f"Frame({width} x {height}, {counted(len(self.object_ids), 'object')}{source})"
 
     @property
     def shape(self) -> tuple[int, int]:

@@ -37,6 +37,7 @@ def read_images(
 
     Errors: FrameError, also where the sizes disagree.
     """
+    said = depth_scale is not None
     color, depth, intrinsics = Path(color), Path(depth), Path(intrinsics)
     camera = read_intrinsics(intrinsics)
     rgb, raw = read_colour(color), read_depth(depth)
@@ -45,6 +46,14 @@ def read_images(
     _same_size(shape, raw.shape[:2], depth)
     if ids is not None:
         _same_size(shape, ids.shape[:2], Path(masks or ""))
+        if not np.any(ids):
+            raise FrameError(
+                "There is no object in the mask",
+                where=masks,
+                expected="at least one pixel that is not 0",
+                found="0 (background) everywhere",
+                fix="leave it out, and masks are made from depth",
+            )
     if camera.shape is not None:
         _same_size(shape, camera.shape, intrinsics)
     if depth_scale is None and raw.dtype.kind in "iu":
@@ -62,11 +71,11 @@ def read_images(
     )
     unit = "millimetres" if raw.dtype.kind in "iu" else "metres"
     log.info(
-        "Depth: %s, taken as %s (median %.2f m); %s says otherwise",
+        "Depth: %s, taken as %s (median %.2f m)%s",
         raw.dtype,
         unit if depth_scale is None else f"units of {depth_scale:g} m",
-        float(np.median(frame.points[frame.valid][:, 2])),
-        option("depth_scale"),
+        float(np.median(frame.depth[frame.valid])),
+        "" if said else f"; {option('depth_scale')} says otherwise",
     )
     return frame
 

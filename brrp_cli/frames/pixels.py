@@ -98,6 +98,13 @@ def read_masks(path: Path) -> NDArray[Any]:
     """(H, W) object ids of an .npy file or an image of one number (or palette index) a pixel."""
     if path.suffix == ".npy":
         return read_npy(path)
+    if path.suffix.lower() in (".jpg", ".jpeg"):
+        raise FrameError(
+            "The mask image is a JPEG, which does not keep ids",
+            where=path,
+            expected="a grey PNG or .npy",
+            fix="write the masks anew: a JPEG's edges hold ids that nobody gave",
+        )
     masks, mode = _open(path, None)
     if masks.ndim != 2:
         raise FrameError(

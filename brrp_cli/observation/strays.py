@@ -16,6 +16,7 @@ from scipy.sparse.csgraph import connected_components
 from brrp_cli.config.observation import StrayConfig
 from brrp_cli.frames.frame import Frame
 from brrp_cli.observation.bled_edges import bled_pixels
+from brrp_cli.spoken import counted
 
 log = logging.getLogger(__name__)
 
@@ -54,15 +55,15 @@ def without_strays(
             stray[window] |= bled | found
             if bled.any() and (told is None or object_id in told):
                 log.info(
-                    "Object %d: its mask is left without %d pixel(s) of a ramp to what is behind",
+                    "Object %d: %s of its mask left out, between it and what is behind it",
                     object_id,
-                    bled.sum(),
+                    counted(int(bled.sum()), "pixel"),
                 )
             if found.any() and (told is None or object_id in told):
                 log.info(
-                    "Object %d: its mask is left without %d pixel(s) far from the object",
+                    "Object %d: %s of its mask left out, far from it in depth",
                     object_id,
-                    found.sum(),
+                    counted(int(found.sum()), "pixel"),
                 )
     if stray.any():
         points = np.where(stray[..., None], np.float32(np.nan), frame.points)

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
+from shlex import quote
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -22,6 +23,7 @@ from brrp_cli.notebook import picture_html, result_html
 from brrp_cli.observation.support_plane import Plane
 from brrp_cli.reconstruction import StoredPosterior, Surface
 from brrp_cli.results.write import FRAME, POSTERIOR, PREVIEW, RECORD, SCHEMA, mesh_name
+from brrp_cli.spoken import counted
 
 if TYPE_CHECKING:
     import trimesh
@@ -52,7 +54,7 @@ class StoredResult:
         """Where it lies and how many objects it has, without the record."""
         made = sum(item["mesh"] is not None for item in self.record["objects"])
         return (
-            f"StoredResult({self.folder}: {made} of {len(self.object_ids)} objects,"
+            f"StoredResult({self.folder}: {made} of {counted(len(self.object_ids), 'object')},"
             f" {self.record['method']})"
         )
 
@@ -83,8 +85,11 @@ class StoredResult:
 
     @cached_property
     def frame(self) -> Frame:
-        """The frame that was reconstructed. Errors: FrameError."""
-        return load_frame(self.folder / FRAME)
+        """The frame that was reconstructed. Errors: FrameError; ResultError if its masks were
+        corrected since."""
+        frame = load_frame(self.folder / FRAME)
+        _check_masks(frame, self.record, self.folder)
+        return frame
 
     @cached_property
     def posteriors(self) -> dict[int, StoredPosterior]:
@@ -199,6 +204,22 @@ def _check(record: dict[str, Any]) -> None:
             if item["mesh"] != mesh_name(item["id"]):
                 raise ValueError(f"mesh {item['mesh']!r}")
             _text(item["uncertainty_unit"])
+
+
+def _check_masks(frame: Frame, record: dict[str, Any], folder: Path) -> None:
+    """ResultError where objects of the results lost their masks, or points of them."""
+    ids, counts = np.unique(frame.segmap[frame.valid], return_counts=True)
+    points = dict(zip(ids.tolist(), counts.tolist(), strict=True))
+    lost = [i["id"] for i in record["objects"] if points.get(i["id"], 0) < i["points"]]
+    if lost:
+        raise ResultError(
+            "The results are of other masks than those of the frame beside them",
+            where=folder / FRAME,
+            expected="the masks that were reconstructed",
+            found=f"other masks of the objects {', '.join(map(str, lost))}",
+            fix=f"reconstruct the corrected frame: brrp reconstruct {quote(str(folder / FRAME))}"
+            " -o NEW/",
+        )
 
 
 def _surface_config(record: dict[str, Any]) -> SurfaceConfig:

@@ -25,6 +25,7 @@ from brrp_cli.reconstruction import (
 )
 from brrp_cli.rendering.preview import preview
 from brrp_cli.results.posterior_file import save_posteriors
+from brrp_cli.spoken import either
 from brrp_cli.surface.painting import surface_colours
 from brrp_cli.version import __version__
 
@@ -97,7 +98,10 @@ def T_frame_cam(seen: Frame, frame: str) -> NDArray[np.float64]:
             "The frame does not say where the camera is in the world",
             where=seen.source,
             expected="the key T_world_cam, (4, 4)",
-            fix="add it to the frame, or ask for --frame camera",
+            fix=either(
+                "name its pose with --camera-pose, or ask for --frame camera",
+                "add it to the frame, or ask for frame='camera'",
+            ),
         )
     distance = float(np.linalg.norm(seen.T_world_cam[:3, 3]))
     if distance > FARTHEST_ORIGIN:

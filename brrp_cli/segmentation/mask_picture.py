@@ -78,9 +78,9 @@ def write_picture(frame: Frame, path: Path) -> None:
 def write_ids(frame: Frame, path: Path) -> None:
     """Write the ids as a 16-bit grey PNG, 0 = background, as `--masks` reads them.
 
-    Errors: OutputError, also for ids that 16 bits do not hold.
+    Errors: OutputError, also for ids that 16 bits do not hold (`fits_ids`).
     """
-    if frame.segmap.min() < 0 or frame.segmap.max() >= 2**16:
+    if not fits_ids(frame):
         raise OutputError(
             "An id does not fit a 16-bit image",
             where=path,
@@ -89,6 +89,11 @@ def write_ids(frame: Frame, path: Path) -> None:
         )
     with atomic_path(path) as partial:
         Image.fromarray(frame.segmap.astype(np.uint16)).save(partial)
+
+
+def fits_ids(frame: Frame) -> bool:
+    """Whether 16 bits hold all ids."""
+    return bool(frame.segmap.min() >= 0 and frame.segmap.max() < 2**16)
 
 
 def _outline(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:

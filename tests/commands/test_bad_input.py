@@ -177,9 +177,7 @@ def test_a_bad_file_is_named(name, folder):
     case = CASES[name]
     case.do(folder / case.file)
     result = frame(folder)
-    # That no pixel is an object is told of the frame as a whole.
-    where = "depth.png" if name == "masks empty" else case.file
-    one_message(result, case.says, f"where:    {folder / where}")
+    one_message(result, case.says, f"where:    {folder / case.file}")
     assert "damaged" not in result.output or "read" in case.says
     assert not (folder / "f.npz").exists()
 

@@ -62,7 +62,7 @@ def test_the_outcome_is_told_and_not_what_retrieval_held_probable():
     assert "not in the prior" in lines([unknown])[1]
     kin = replace(unknown, taken_for="bowl", how="similar")
     assert kin.name == "like bowl" and "like bowl" in lines([kin])[1]
-    assert "1 of 1 objects, 2.0 s: like bowl" in one_line("scene", [kin], 2.0)
+    assert "1 of 1 object, 2.0 s: like bowl" in one_line("scene", [kin], 2.0)
     assert tell(item(unit=LOGIT_VARIANCE)).uncertainty is None
 
 

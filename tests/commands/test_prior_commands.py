@@ -32,7 +32,7 @@ def test_build_says_what_failed_and_what_was_written(built: tuple[Path, Result])
     assert "big_block.stl" in result.stderr
     assert "--units mm" in result.stderr
     last = result.stdout.splitlines()[-1]
-    assert last.startswith("1 objects (1 made, 0 kept, 1 failed)")
+    assert last.startswith("1 object (1 made, 0 kept, 1 failed)")
     assert str(folder) in last
 
 

@@ -39,7 +39,7 @@ def test_add_list_show_remove(folder: Path, tmp_path: Path) -> None:
     prior = ("--prior", folder / "prior")
     added = brrp("prior", "add", folder / "b/ball.stl", "--workers", 1, *prior)
     assert added.exit_code == 0, added.stderr
-    assert "1 objects made; 2 objects now" in added.stdout
+    assert "1 object made; 2 objects now" in added.stdout
     assert brrp("prior", "list", *prior).stdout == "ball\ta ball\nred_box\ta red box\n"
     shown = brrp("prior", "show", "red_box", *prior, "-o", tmp_path / "box.png")
     assert shown.exit_code == 0, shown.stderr
@@ -57,7 +57,7 @@ def test_add_list_show_remove(folder: Path, tmp_path: Path) -> None:
     assert again.exit_code == 1 and "--overwrite" in again.stderr
     assert "red_box" in brrp("prior", "show", "red_bax", *prior).stderr
     removed = brrp("prior", "remove", "ball", *prior)
-    assert "1 objects removed; 1 objects now" in removed.stdout
+    assert "1 object removed; 1 object now" in removed.stdout
     assert brrp("prior", "list", *prior).stdout == "red_box\ta red box\n"
 
 

@@ -264,7 +264,7 @@ def test_where_no_object_gets_a_surface_the_record_is_written_all_the_same(
     code, output = run(tmp_path / "speck.npz", *of_a_prior, *options, "-o", tmp_path / "out")
     assert code == 3
     assert "too_few_points; 5 " in output and "are needed" in output
-    assert "Wrote 0 of 1 objects" in output and "no mesh: result.json says why" in output
+    assert "Wrote 0 of 1 object" in output and "no mesh: result.json says why" in output
     names = {path.name for path in (tmp_path / "out").iterdir()}
     assert names == {"frame.npz", "posterior.h5", "result.json", "preview.png"}
     record = json.loads((tmp_path / "out" / "result.json").read_text())

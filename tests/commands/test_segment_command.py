@@ -118,6 +118,8 @@ def test_a_frame_without_masks_gets_some(saved, tmp_path):
         (["--split", "4:1"], 2, "two pieces"),
         (["--split", "x"], 2, "ID:PIECES"),
         (["--drop", "4,7,9"], 1, "no object in the mask"),
+        (["--merge", "4,7", "--drop", "7"], 2, "not in two: 7"),
+        (["--all"], 2, "add --again"),
     ],
 )
 def test_wrong_corrections_are_told_and_write_nothing(saved, tmp_path, arguments, code, message):
@@ -133,3 +135,22 @@ def test_nothing_is_overwritten_unasked(saved, tmp_path):
     assert run(path, "-o", tmp_path / "g.npz").exit_code == 1
     assert run(path, "--drop", "9", "-o", path, "--overwrite").exit_code == 0
     assert load_frame(path).object_ids == [4, 7]
+
+
+def test_numbers_of_masks_that_are_kept_are_not_silently_unused(saved, tmp_path):
+    (tmp_path / "c.toml").write_text("[segmentation]\nmin_height = 0.005\n")
+    options = ["--config", tmp_path / "c.toml", "-o", tmp_path / "g.npz"]
+    assert "--config is of masks that are made" in run(saved[0], *options).output
+    assert run(saved[0], *options, "--split", 4).exit_code == 0
+
+
+def test_ids_that_16_bits_do_not_hold_are_corrected_without_their_image(saved, tmp_path):
+    path, frame = saved
+    large = np.where(frame.segmap == 9, 70_000, frame.segmap)
+    save_frame(frame.with_masks(large), path)
+    (tmp_path / "g.ids.png").write_text("old")
+    result = run(path, "--drop", 4, "-o", tmp_path / "g.npz", "--overwrite")
+    assert result.exit_code == 0, result.output
+    assert load_frame(tmp_path / "g.npz").object_ids == [7, 70_000]
+    assert "16 bits do not hold all ids" in result.output
+    assert not (tmp_path / "g.ids.png").exists()

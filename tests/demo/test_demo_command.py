@@ -26,7 +26,7 @@ def test_the_demo_ends_with_scores_and_files(small):
     result = CliRunner().invoke(main, ["demo"])
     assert result.exit_code == 0, result.output
     last = result.output.strip().splitlines()[-1]
-    assert last.startswith("Wrote 1 of 1 objects")
+    assert last.startswith("Wrote 1 of 1 object")
     assert "brrp_demo/" in last
     out = small / "brrp_demo"
     frame = load_frame(out / "frame.npz")

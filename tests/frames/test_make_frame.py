@@ -212,6 +212,27 @@ def test_a_principal_point_outside_the_image_is_noted(caplog):
     assert "outside the 8 x 6 image" in caplog.text
 
 
+def test_intrinsics_of_a_smaller_image_are_noted(caplog):
+    depth = np.ones((120, 160))
+    half = [[75, 0, 40], [0, 75, 30], [0, 0, 1]]
+    make_frame(depth=depth, K=half)
+    assert "middle of about 80 x 60 pixels, not of 160 x 120" in caplog.text
+    caplog.clear()
+    make_frame(depth=depth, K=[[150, 0, 80], [0, 150, 60], [0, 0, 1]])
+    make_frame(depth=depth, K=[[150, 0, 40], [0, 150, 60], [0, 0, 1]])
+    assert "middle of about" not in caplog.text
+
+
+def test_a_camera_far_from_the_worlds_origin_is_noted(caplog):
+    K, pose = [[150, 0, 80], [0, 150, 60], [0, 0, 1]], np.eye(4)
+    pose[:3, 3] = 0.3, -0.2, 0.9
+    make_frame(depth=np.ones((120, 160)), K=K, T_world_cam=pose)
+    assert "origin" not in caplog.text
+    pose[:3, 3] *= 1000
+    make_frame(depth=np.ones((120, 160)), K=K, T_world_cam=pose)
+    assert "969.5 m from the world's origin" in caplog.text and "metres" in caplog.text
+
+
 def test_missing_colour_becomes_grey():
     assert (make_frame(**good(rgb=None)).rgb == 128).all()
 
