@@ -38,6 +38,7 @@ from brrp_cli.retrieval.base import one_image
 from brrp_cli.segmentation.mend_masks import changed_masks
 from brrp_cli.tracking.carried import with_carried
 from brrp_cli.tracking.followed import Followed, first_frame, follow, not_tried, with_known
+from brrp_cli.tracking.lost import Lost, lost_tracks
 from brrp_cli.tracking.motion import at_rest, camera_motion, spread_out, unmoved
 
 if TYPE_CHECKING:
@@ -206,7 +207,10 @@ class Reconstructor:
         if mends:
             least = self._segmentation.mend.least_part
             mended |= set(changed_masks(result.frame.segmap, seen.segmap, least))
-        self._last = _followed(result.frame, next_id, frozenset(mended), aside)
+        lost: tuple[Lost, ...] = ()
+        if self._last is not None:
+            lost = lost_tracks(self._last.frame, self._last.lost, result.frame, self._track)
+        self._last = _followed(result.frame, next_id, frozenset(mended), lost, aside)
         return result
 
     def _mended(
@@ -228,6 +232,9 @@ class Reconstructor:
         if track is None or track.sharpen is None:
             return None
         here = set(frame.object_ids)
+        if self._last is not None:
+            # Who is out of sight may come back.
+            here |= {*self._last.frame.object_ids, *(each.object_id for each in self._last.lost)}
         self._seen = {i: views for i, views in self._seen.items() if i in here}
         earlier: dict[int, tuple[EarlierView, ...]] = {}
         for object_id in self._seen.keys() & set(ids):
@@ -318,16 +325,21 @@ class Reconstructor:
 
 
 def _followed(
-    frame: Frame, next_id: int, mended: frozenset[int], aside: NDArray[np.int64] | None
+    frame: Frame,
+    next_id: int,
+    mended: frozenset[int],
+    lost: tuple[Lost, ...],
+    aside: NDArray[np.int64] | None,
 ) -> Followed:
     """What to follow into the next frame; aside : (H, W) masks that were left out, 0 = none."""
     if aside is None:
-        return Followed(frame, next_id, mended)
+        return Followed(frame, next_id, mended, lost)
     strangers = np.where(frame.segmap == BACKGROUND, aside, BACKGROUND)
     return Followed(
         frame,
         next_id,
         mended,
+        lost,
         of_left_out(frame, aside),
         frame.with_masks(strangers) if strangers.any() else None,
     )

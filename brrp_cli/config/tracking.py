@@ -74,6 +74,7 @@ class TrackConfig:
     pose is given, a camera stands if both images share a share `ground` of background with depth,
     which has changed by `still` at most in the middle and `still_tail` times that in nine tenths of
     it, and its colours by `still_colour`, of 255
+    lost : tracks that are remembered while their object is out of sight
     carry : when masks that were mended hold in the next frame
     sharpen : how earlier views of an object join the newest one; None = they do not
     """
@@ -89,5 +90,6 @@ class TrackConfig:
     ground: float = share(0.2)
     still_tail: float = 5.0
     still_colour: float = 10.0
+    lost: int = between(16, 0, 1000)
     carry: CarryConfig = field(default_factory=CarryConfig)
     sharpen: SharpenConfig | None = field(default_factory=SharpenConfig)

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from brrp_cli.config.tracking import TrackConfig
 from brrp_cli.frames.frame import BACKGROUND, Frame
 from brrp_cli.segmentation.other_masks import with_left_out
+from brrp_cli.tracking.lost import Lost, found_again
 from brrp_cli.tracking.match import match
 from brrp_cli.tracking.motion import camera_motion, unmoved
 
@@ -19,6 +20,7 @@ class Followed:
     """A frame whose ids are those of the tracks.
 
     next_id : the first id that is free; mended : ids of masks that recognised objects changed
+    lost : tracks whose object is out of sight
     left_out : ids of what is recognised in a mask that was left out when masks were made, as what
     the image's border cuts is; strangers : the frame with those of these masks in which nothing is
     """
@@ -26,6 +28,7 @@ class Followed:
     frame: Frame
     next_id: int
     mended: frozenset[int] = frozenset()
+    lost: tuple[Lost, ...] = ()
     left_out: frozenset[int] = frozenset()
     strangers: Frame | None = None
 
@@ -36,9 +39,12 @@ def first_frame(frame: Frame) -> Followed:
 
 
 def follow(last: Followed, frame: Frame, config: TrackConfig) -> Followed:
-    """The frame with the ids of the last one where an object is the same, and new ones else."""
+    """The frame with the ids of the last one, or of what was lost before, where an object is the
+    same, and new ones else."""
     T_now_last = camera_motion(last.frame, frame, config)
     matches = match(last.frame, frame, T_now_last, config)
+    new = [i for i in frame.object_ids if i not in matches]
+    matches |= found_again(last.lost, frame, new, config)
     segmap, next_id = np.zeros_like(frame.segmap), last.next_id
     for object_id in frame.object_ids:
         track = matches.get(object_id)

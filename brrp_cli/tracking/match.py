@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from brrp_cli.config.tracking import TrackConfig
 from brrp_cli.frames.frame import Frame
-from brrp_cli.frames.projection import at_pixels
+from brrp_cli.frames.projection import at_pixels, depth_behind
 from brrp_cli.geometry import transform_points
 
 
@@ -24,7 +24,23 @@ def match(
     colour and size."""
     T = np.eye(4) if T_now_last is None else T_now_last
     found = _assign(last, frame, lambda a, b: _overlap(last, frame, T, a, b, config), {})
-    return found | _assign(last, frame, lambda a, b: _alike(last, frame, T, a, b, config), found)
+    moved = set(last.object_ids) - set(found.values())
+    if T_now_last is not None:
+        moved = {i for i in moved if _shows_its_place(last, frame, T, i, config)}
+
+    def alike(old: int, new: int) -> float:
+        return _alike(last, frame, T, old, new, config) if old in moved else 0.0
+
+    return found | _assign(last, frame, alike, found)
+
+
+def _shows_its_place(
+    last: Frame, frame: Frame, T: NDArray[np.float64], old: int, config: TrackConfig
+) -> bool:
+    """Whether the frame shows at least half of where the object was: from what is hidden nobody
+    can tell that it has moved."""
+    gap = depth_behind(transform_points(T, last.object_points(old)), frame)
+    return bool(len(gap)) and float((gap >= -config.carry.gap).mean()) >= 0.5
 
 
 def _assign(
