@@ -10,8 +10,9 @@ from scipy.optimize import linear_sum_assignment
 
 from brrp_cli.config.tracking import TrackConfig
 from brrp_cli.frames.frame import Frame
-from brrp_cli.frames.projection import at_pixels, depth_behind
+from brrp_cli.frames.projection import depth_behind
 from brrp_cli.geometry import transform_points
+from brrp_cli.tracking.match import seen_again
 from brrp_cli.tracking.motion import camera_motion
 
 
@@ -48,7 +49,7 @@ def found_again(
 
 
 def _gone(each: Lost, now: Frame, config: TrackConfig) -> bool:
-    """Whether the frame sees through the place of the object."""
+    """Whether the frame sees through most of the place of the object."""
     T_now_then = camera_motion(each.frame, now, config)
     if T_now_then is None:
         return False
@@ -59,15 +60,12 @@ def _gone(each: Lost, now: Frame, config: TrackConfig) -> bool:
 
 
 def _same(each: Lost, frame: Frame, new: int, config: TrackConfig) -> float:
-    """Share of the lost object's points that are seen again in the new mask; 0 where it is too
-    little, or the colour is another."""
+    """Share of the lost object's points that fall on the new mask; 0 where it is too little, or the
+    colour is another."""
     T_now_then = camera_motion(each.frame, frame, config)
-    points = each.frame.object_points(each.object_id)
-    if T_now_then is None or not len(points):
+    if T_now_then is None:
         return 0.0
-    points = transform_points(T_now_then, points)
-    seen = np.abs(depth_behind(points, frame)) <= config.carry.gap
-    hits = float((seen & (at_pixels(points, frame.segmap, frame) == new)).mean())
+    hits = seen_again(each.frame, frame, T_now_then, each.object_id, new, config.carry.gap)
     before = each.frame.rgb[each.frame.segmap == each.object_id].mean(axis=0)
     colour = np.abs(before - frame.rgb[frame.segmap == new].mean(axis=0)).mean()
     return hits if hits >= config.overlap and colour <= config.colour else 0.0

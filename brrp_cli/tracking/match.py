@@ -23,7 +23,7 @@ def match(
     """Id in the frame -> id in the last one: first by place, then, of what is left, by nearness,
     colour and size."""
     T = np.eye(4) if T_now_last is None else T_now_last
-    found = _assign(last, frame, lambda a, b: _overlap(last, frame, T, a, b, config), {})
+    found = _assign(last, frame, lambda a, b: _overlap(last, frame, T_now_last, a, b, config), {})
     moved = set(last.object_ids) - set(found.values())
     if T_now_last is not None:
         moved = {i for i in moved if _shows_its_place(last, frame, T, i, config)}
@@ -58,15 +58,42 @@ def _assign(
     return {new[c]: old[r] for r, c in zip(rows, columns, strict=True) if scores[r, c] > 0}
 
 
-def _overlap(
-    last: Frame, frame: Frame, T: NDArray[np.float64], old: int, new: int, config: TrackConfig
+def seen_again(
+    last: Frame, frame: Frame, T_now_last: NDArray[np.float64], old: int, new: int, near: float
 ) -> float:
-    """Share of the old object's points that fall on the new mask; 0 where it is too little."""
-    points = transform_points(T, last.object_points(old))
+    """Share of the old object's points that fall on the new mask: on its surface, within `near`
+    metres, or behind it by no more than the object is thick, for then it is another's."""
+    points = last.object_points(old)
     if not len(points):
         return 0.0
-    ids = at_pixels(points, frame.segmap, frame)
-    hits = float((ids == new).sum()) / len(points)
+    moved = transform_points(T_now_last, points)
+    gap = depth_behind(moved, frame)
+    # Where there is no depth nobody can tell.
+    there = ~(gap > near) & ~(gap < -max(near, thickness(points)))
+    return float((there & (at_pixels(moved, frame.segmap, frame) == new)).mean())
+
+
+def thickness(points: NDArray[np.floating]) -> float:
+    """Metres, the second of the three sides of a box around points (n, 3), along their axes."""
+    centred = points - points.mean(axis=0)
+    _, axes = np.linalg.eigh(centred.T @ centred)
+    return float(np.sort(np.ptp(centred @ axes, axis=0))[1])
+
+
+def _overlap(
+    last: Frame,
+    frame: Frame,
+    T_now_last: NDArray[np.float64] | None,
+    old: int,
+    new: int,
+    config: TrackConfig,
+) -> float:
+    """Share of the old object's points that fall on the new mask; 0 where it is too little."""
+    if T_now_last is not None:
+        hits = seen_again(last, frame, T_now_last, old, new, config.carry.gap)
+    else:
+        ids = at_pixels(last.object_points(old), frame.segmap, frame)
+        hits = float((ids == new).mean()) if len(ids) else 0.0
     return hits if hits >= config.overlap else 0.0
 
 
