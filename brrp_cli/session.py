@@ -127,6 +127,10 @@ class Reconstructor:
         made = not frame.object_ids or frame.aside is not None
         masked, aside = frame.with_masks(frame.segmap), frame.aside
         if not frame.object_ids:
+            if self._tracker is not None:
+                same = self._tracker.again(masked, self._all)
+                if same is not None:
+                    return replace(same, segmentation=asdict(self._segmentation))
             masked, aside = self._with_masks(frame)
         seconds = time.perf_counter() - start
         if self._tracker is not None:

@@ -78,7 +78,7 @@ def camera_motion(last: Frame, frame: Frame, config: TrackConfig) -> NDArray[np.
     both = ground & last.valid & frame.valid
     if both.sum() < config.ground * both.size:
         return None
-    apart = np.abs(last.depth[both] - frame.depth[both]) / _noisier(last.depth[both])
+    apart = np.abs(last.depth[both] - frame.depth[both]) / noisier(last.depth[both])
     # A camera that turns changes depth at every edge, one that slides along a table at few places.
     colour = np.abs(last.rgb[ground].astype(np.int16) - frame.rgb[ground]).mean()
     same = (
@@ -112,10 +112,10 @@ def same_depth(last: Frame, frame: Frame, mask: NDArray[np.bool_], config: Track
     apart = frame.depth[both] - last.depth[both]
     # Noise of single pixels is no motion: the middle of their differences tells of it.
     shifted = abs(float(np.median(apart)))
-    scattered = float(np.median(np.abs(apart) / _noisier(last.depth[both])))
+    scattered = float(np.median(np.abs(apart) / noisier(last.depth[both])))
     return shifted <= config.still and scattered <= config.noise
 
 
-def _noisier(depth: NDArray[np.floating]) -> NDArray[np.floating]:
+def noisier(depth: NDArray[np.floating]) -> NDArray[np.floating]:
     """Factor by which depth (n,), metres, is noisier than at one metre, where that is far."""
     return np.maximum(depth, 1.0) ** 2

@@ -24,6 +24,7 @@ from brrp_cli.tracking.followed import Followed, first_frame, follow, not_tried,
 from brrp_cli.tracking.lost import Lost, lost_tracks
 from brrp_cli.tracking.motion import at_rest, camera_motion, spread_out, unmoved
 from brrp_cli.tracking.renamed import new_names, with_names
+from brrp_cli.tracking.unchanged import unchanged
 
 
 @dataclass(frozen=True)
@@ -68,6 +69,8 @@ class Tracker:
     def __init__(self, config: TrackConfig, least_part: float) -> None:
         self._config, self._least_part = config, least_part
         self._last: Followed | None = None
+        # The frame that masks were made of last.
+        self._masked: Frame | None = None
         # Frames, and what was inferred from each and still holds.
         self._made: list[tuple[Frame, Reconstruction]] = []
         # Of each object, the frames that showed it and what the method remembers of them.
@@ -81,18 +84,14 @@ class Tracker:
         made : None for masks that came with the frame, which are not mended
         """
         start = time.perf_counter()
+        self._masked = None if made is None else frame
         followed, carried, fresh = self._follow(frame, made)
         seen, kept = followed.frame, self._kept(followed.frame)
         seconds = time.perf_counter() - start
         todo = set(seen.object_ids) - {item.object_id for item in kept}
         stream = self._stream(seen, todo)
         infer = partial(everything, stream=stream)
-        if todo or not self._made:
-            result = infer(seen, todo)
-        else:
-            result = replace(self._made[0][1], frame=seen, objects=[], seconds={}, image=None)
-        objects = sorted([*result.objects, *kept], key=lambda item: item.object_id)
-        result = replace(result, objects=objects)
+        result = self._inferred(seen, kept, todo, infer)
         if made is not None:
             theirs = np.isin(frame.segmap, [*made.corrected])
             corrected = np.unique(seen.segmap[theirs]).tolist()
@@ -107,6 +106,37 @@ class Tracker:
         aside = None if made is None else made.aside
         self._last = self._followed(result.frame, next_id, frozenset(mended), aside)
         return result
+
+    def again(self, frame: Frame, everything: Infer) -> Reconstruction | None:
+        """All objects of a frame without masks, under the masks of the last one, where nothing has
+        changed since these were made; else None."""
+        start, last = time.perf_counter(), self._last
+        if last is None or self._masked is None or frame.shape != last.frame.shape:
+            return None
+        seen = frame.with_masks(last.frame.segmap)
+        masked = self._masked.with_masks(last.frame.segmap)
+        if not unchanged(masked, seen, self._config):
+            return None
+        kept = self._kept(seen)
+        seconds = time.perf_counter() - start
+        todo = set(seen.object_ids) - {item.object_id for item in kept}
+        stream = self._stream(seen, todo)
+        result = self._inferred(seen, kept, todo, partial(everything, stream=stream))
+        result.seconds["tracking"] = seconds
+        self._keep(result, kept, stream)
+        self._last = replace(last, frame=seen)
+        return result
+
+    def _inferred(
+        self, seen: Frame, kept: list[ObjectReconstruction], todo: Collection[int], infer: Objects
+    ) -> Reconstruction:
+        """What was kept, and the objects `todo` as they are inferred now."""
+        if todo or not self._made:
+            result = infer(seen, only=todo)
+        else:
+            result = replace(self._made[0][1], frame=seen, objects=[], seconds={}, image=None)
+        objects = sorted([*result.objects, *kept], key=lambda item: item.object_id)
+        return replace(result, objects=objects)
 
     def _follow(
         self, frame: Frame, made: Made | None
