@@ -49,12 +49,16 @@ class CarryConfig:
     moved : part of an object's points, of those that are not hidden, whose place is free by now, at
         most
     opening : half the width, pixels, of what is too thin to be an object; least_pixels : of one
+    side, same : radians between two views, and part that two masks share, both ways, within which
+    what was looked for in one mask is not looked for in the other
     """
 
     gap: float = 0.012
     moved: float = share(0.1)
     opening: int = between(3, 1, 64)
     least_pixels: int = 200
+    side: float = 0.3
+    same: float = share(0.8)
 
 
 @dataclass(frozen=True)

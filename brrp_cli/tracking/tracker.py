@@ -24,6 +24,7 @@ from brrp_cli.tracking.followed import Followed, first_frame, follow, not_tried,
 from brrp_cli.tracking.lost import Lost, lost_tracks
 from brrp_cli.tracking.motion import at_rest, camera_motion, spread_out, unmoved
 from brrp_cli.tracking.renamed import new_names, with_names
+from brrp_cli.tracking.tried import tried_before
 from brrp_cli.tracking.unchanged import unchanged
 
 
@@ -73,6 +74,8 @@ class Tracker:
         self._masked: Frame | None = None
         # Frames, and what was inferred from each and still holds.
         self._made: list[tuple[Frame, Reconstruction]] = []
+        # Of each object, the frame in whose mask of it others were looked for.
+        self._tried: dict[int, Frame] = {}
         # Of each object, the frames that showed it and what the method remembers of them.
         self._seen: dict[int, list[tuple[Frame, Memory]]] = {}
 
@@ -95,8 +98,12 @@ class Tracker:
         if made is not None:
             theirs = np.isin(frame.segmap, [*made.corrected])
             corrected = np.unique(seen.segmap[theirs]).tolist()
-            result = mend(result, infer, fresh, todo, followed.next_id, corrected)
+            asked = todo - tried_before(self._tried, seen, self._config)
+            result = mend(result, infer, fresh, asked, followed.next_id, corrected)
             result = self._renamed(result, followed, corrected)
+            looked = {*result.frame.object_ids} - ({*seen.object_ids} - asked)
+            old = {i: f for i, f in self._tried.items() if i in result.frame.object_ids}
+            self._tried = old | dict.fromkeys(looked, result.frame)
         result.seconds["tracking"] = seconds
         self._keep(result, kept, stream)
         mended = set(np.unique(result.frame.segmap[carried]).tolist()) - {BACKGROUND}

@@ -334,3 +334,24 @@ def test_what_was_mended_keeps_its_id_and_is_not_tried_again(prior, frame, aside
     assert taken_for(first) == taken_for(second)
     posteriors = {item.object_id: item.posterior for item in first.objects}
     assert all(item.posterior is posteriors[item.object_id] for item in second.objects)
+
+
+def test_a_camera_that_hardly_moves_looks_into_no_mask_twice(prior, frame, aside, monkeypatch):
+    tried = []
+
+    def counted(frame, masks, *args, **kwargs):
+        tried.append(len(masks))
+        return try_masks(frame, masks, *args, **kwargs)
+
+    monkeypatch.setattr("brrp_cli.session.try_masks", counted)
+    nearer = np.eye(4)
+    nearer[2, 3] = 0.01
+    made = frame.with_masks(frame.segmap, aside)
+    here = replace(made, T_world_cam=np.eye(4))
+    there = replace(made, T_world_cam=nearer, points=(made.points - [0, 0, 0.01]).astype("f4"))
+    with Reconstructor(prior, retriever="appearance", workers=1, track=True) as session:
+        first = session(here)
+        tried.clear()
+        second = session(there)
+    assert sum(tried) <= 1, "but for the stranger, which was left out"
+    assert taken_for(first) == taken_for(second)
