@@ -11,6 +11,7 @@ from test_tracking import BLUE, GREEN, RED, START, A, colour_of, scene
 
 from brrp_cli import Reconstructor
 from brrp_cli.config.tracking import TrackConfig
+from brrp_cli.errors import FrameError
 from brrp_cli.methods.registry import METHODS
 from brrp_cli.tracking.unchanged import unchanged
 
@@ -50,7 +51,7 @@ def test_a_still_view_has_the_masks_of_the_last_frame(made):
         assert len(made) == 1
         assert np.array_equal(again.frame.segmap, first.frame.segmap)
         assert [i.posterior for i in again.objects] == [i.posterior for i in first.objects]
-        assert again.segmentation == first.segmentation
+        assert again.segmentation == first.segmentation and again.seconds["masks"] == 0
         # One is moved: masks are made, and it alone is done again.
         moved = session(bare(START | {GREEN: (0.12, 0.13)}, noise=0.001, seed=4))
     assert len(made) == 2
@@ -94,3 +95,20 @@ def test_masks_that_come_with_a_frame_are_never_replaced(made):
         assert len(session(two).objects) == 2
         session(bare(START))
     assert len(made) == 2, "those of the last frame were not made here"
+
+
+def test_masks_of_a_frame_that_failed_are_no_ones(made, monkeypatch):
+    empty, full = scene({RED: A}), scene(START)
+    shown = bare(START)
+    with Reconstructor(method="sphere", track=True) as session:
+        session(bare({RED: A}))
+        monkeypatch.setattr(session, "_mended", _fails)
+        with pytest.raises(FrameError):
+            session(shown)
+        monkeypatch.undo()
+        monkeypatch.setitem(METHODS, METHOD.name, replace(METHOD, object_by_object=True))
+        assert len(session(shown).objects) == len(full.object_ids) != len(empty.object_ids)
+
+
+def _fails(*args, **kwargs):
+    raise FrameError("nothing is left")

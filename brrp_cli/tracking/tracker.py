@@ -87,7 +87,6 @@ class Tracker:
         made : None for masks that came with the frame, which are not mended
         """
         start = time.perf_counter()
-        self._masked = None if made is None else frame
         followed, carried, fresh = self._follow(frame, made)
         seen, kept = followed.frame, self._kept(followed.frame)
         seconds = time.perf_counter() - start
@@ -111,6 +110,7 @@ class Tracker:
             mended |= set(changed_masks(result.frame.segmap, seen.segmap, self._least_part))
         next_id = max(followed.next_id, max(result.frame.object_ids) + 1)
         aside = None if made is None else made.aside
+        self._masked = None if made is None else frame
         self._last = self._followed(result.frame, next_id, frozenset(mended), aside)
         return result
 
