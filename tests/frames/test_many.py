@@ -122,3 +122,14 @@ def test_names_of_every_format_read_the_frames_that_they_are_of(scene, tmp_path)
         assert np.array_equal(named, right) and np.array_equal(counted, right)
     with pytest.raises(FrameError, match="no such frame"):
         read_frame(tmp_path, request=Request(index="5"))
+
+
+def test_an_array_that_lies_beside_frames_is_none_of_them(scene, tmp_path):
+    save_frame(scene, tmp_path / "a.npz")
+    np.save(tmp_path / "depth.npy", scene.depth)
+    assert list_frames(tmp_path) == ["a.npz"]
+    assert_the_scene(read_frame(tmp_path), scene)
+    (tmp_path / "only").mkdir()
+    np.save(tmp_path / "only" / "depth.npy", scene.depth)
+    with pytest.raises(FrameError):
+        list_frames(tmp_path / "only")

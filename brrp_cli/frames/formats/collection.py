@@ -26,6 +26,9 @@ def parts_in(path: Path) -> dict[str, Path]:
 def _format_of(path: Path) -> Format | None:
     from brrp_cli.frames.readers import known_formats
 
+    if path.suffix == ".npy":  # an array that lies about; a reader only tells what it is not
+        return None
+
     others = [one for one in known_formats() if one is not FORMAT]
     found = [one for one in others if not one.last and one.matches(path)]
     found = found or [one for one in others if one.last and one.matches(path)]
