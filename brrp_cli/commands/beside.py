@@ -47,7 +47,7 @@ class Beside:
     def lacking(self, stored: StoredResult) -> list[str]:
         """What of it is not there, or was made in another way; none of what needs a mesh where no
         object has one. In the order in which it is written: the page shows what the others are."""
-        meshes = bool(stored.surfaces)
+        meshes = any(item["mesh"] is not None for item in stored.record["objects"])
         lacks = {
             POSES: self.poses and not (stored.folder / POSES).is_file(),
             PLAN: meshes and self.plan is not None and not _as_asked(stored, PLAN, _of(self.plan)),

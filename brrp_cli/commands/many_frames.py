@@ -140,7 +140,7 @@ def run_many(work: Work, frames: slice, output: Path, report: dict[str, Any]) ->
         for about in told:
             name = about["frame"]
             if name in done:
-                _complete(work, name, done[name])
+                failed |= _complete(work, about, done[name])
                 continue
             failed |= _frame(work, about, folders[name])
             step()
@@ -159,13 +159,19 @@ def run_many(work: Work, frames: slice, output: Path, report: dict[str, Any]) ->
     return failed
 
 
-def _complete(work: Work, name: str, stored: StoredResult) -> None:
-    """What is asked for beside the results of a frame that was there, and is not there yet."""
+def _complete(work: Work, about: dict[str, Any], stored: StoredResult) -> bool:
+    """What is asked for beside the results of a frame that was there, and is not there yet; whether
+    that failed, as where its masks were corrected since."""
     lacking = work.beside.lacking(stored)
-    if lacking:
+    if not lacking:
+        return False
+    try:
         with redirect_stdout(io.StringIO()):
             work.beside.write(stored, lacking)
-        say(f"  {name}: was there; new: {', '.join(lacking)}")
+    except (FrameError, ResultError) as error:
+        return _failure(about, error)
+    say(f"  {about['frame']}: was there; new: {', '.join(lacking)}")
+    return False
 
 
 def _frame(work: Work, about: dict[str, Any], folder: Path) -> bool:

@@ -49,7 +49,7 @@ def found_again(
 
 
 def _gone(each: Lost, now: Frame, config: TrackConfig) -> bool:
-    """Whether the frame sees through most of the place of the object."""
+    """Whether the frame sees through a good part of the place of the object."""
     T_now_then = camera_motion(each.frame, now, config)
     if T_now_then is None:
         return False

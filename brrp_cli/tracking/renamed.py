@@ -23,10 +23,8 @@ def new_names(
     held = set(frame.object_ids) - set(asked)
     tracks = [*(Lost(last.frame, i) for i in last.frame.object_ids), *last.lost]
     names = found_again([t for t in tracks if t.object_id not in held], frame, asked, config)
-    taken, free = (
-        held | set(names.values()),
-        count(max(next_id, *(i + 1 for i in frame.object_ids))),
-    )
+    taken = held | set(names.values())
+    free = count(max([next_id, *(i + 1 for i in frame.object_ids)]))
     for each in asked:
         if each not in names:
             names[each] = next(free) if each in taken else each

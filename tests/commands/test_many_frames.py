@@ -220,3 +220,18 @@ def test_settings_that_differ_are_named_with_their_values(source, tmp_path):
     result = run(source, "--frames", ":1", "-o", out)
     assert result.exit_code == 1
     assert "found:    segmentation.table.tolerance 0.5" in result.output
+
+
+def test_a_frame_that_was_corrected_since_fails_alone(source, tmp_path):
+    out = tmp_path / "out"
+    assert run(source, "--frames", ":2", "-o", out).exit_code == 0
+    path = out / "f0.npz" / "frame.npz"
+    frame = load_frame(path)
+    half = np.arange(frame.shape[1]) < np.median(np.nonzero(frame.segmap)[1])
+    save_frame(frame.with_masks(np.where(half, frame.segmap, 0)), path)
+    result = run(source, "--frames", ":2", "-o", out, "--grasp")
+    assert result.exit_code == 3, result.output
+    assert "Error: frame f0.npz: " in result.stderr and "other masks" in result.stderr
+    assert "f1.npz: was there; new: grasps.json" in result.stdout
+    told = json.loads((out / "frames.json").read_text())["frames"]
+    assert [each["status"] for each in told] == ["failed", "was there"]
