@@ -49,3 +49,12 @@ def test_masks_that_are_gone_are_named(folder):
     save_frame(frame.with_masks(np.where(frame.segmap == 7, 0, frame.segmap)), folder / "frame.npz")
     with pytest.raises(ResultError, match="other masks of the objects 7"):
         _ = open_result(folder).frame
+
+
+def test_what_a_session_kept_from_an_earlier_frame_is_read_with_the_newest(folder):
+    frame = load_frame(folder / "frame.npz")
+    rng = np.random.default_rng(0)
+    gone = (frame.segmap == 7) & (rng.random(frame.shape) < 0.1)
+    points = np.where(gone[..., None], np.float32(np.nan), frame.points)
+    save_frame(frame.with_points(points), folder / "frame.npz")
+    assert open_result(folder).frame.object_points(7).size
