@@ -80,6 +80,14 @@ def test_what_creeps_is_seen_in_the_end(made):
     assert 2 <= len(made) <= 8
 
 
+def test_what_slides_by_less_than_a_centimetre_is_seen_at_its_borders(made):
+    with Reconstructor(method="sphere", track=True) as session:
+        ids = by_colour(session(bare(START, noise=0.001)))
+        slid = session(bare(START | {GREEN: (0.1, 0.008)}, noise=0.001, seed=1))
+    assert len(made) == 2 and by_colour(slid) == ids
+    assert [item.object_id for item in slid.objects if item.seconds] == [ids[GREEN]]
+
+
 def test_a_camera_that_goes_sees_another_view():
     first = scene(START, known=True)
     assert unchanged(first, scene(START, known=True), TRACK)

@@ -20,6 +20,7 @@ from brrp_cli.frames.projection import at_pixels, depth_behind
 from brrp_cli.geometry import transform_points
 from brrp_cli.tracking.followed import Followed
 from brrp_cli.tracking.motion import camera_motion, same_depth, stands
+from brrp_cli.tracking.unchanged import changed_pixels, slides
 
 Mask = NDArray[np.bool_]
 
@@ -56,7 +57,8 @@ def with_carried(
     resting = [i for i in sorted(last.mended) if _rests(last.frame, frame, T_now_last, i, own)]
     if stands(T_now_last, config) and last.frame.shape == frame.shape:
         others = set(last.frame.object_ids) - last.mended
-        resting += [i for i in sorted(others) if _stays(last.frame, frame, i, config)]
+        changed = changed_pixels(last.frame, frame, config)
+        resting += [i for i in sorted(others) if _stays(last.frame, frame, i, changed, config)]
     if not resting:
         return frame, nowhere
     before = _before(last.frame, frame, np.asarray(np.linalg.inv(T_now_last)), own)
@@ -67,7 +69,11 @@ def with_carried(
     for mask_id in np.unique(frame.segmap[carried & (frame.segmap != BACKGROUND)]):
         mask = frame.segmap == mask_id
         if (mask & carried).sum() >= config.overlap * mask.sum():
-            _take_apart(segmap, mask, carried, before, own)
+            # What slides uncovers a strip, which is no thing that has come.
+            near = float(np.median(frame.depth[mask & carried]))
+            strip = round(own.gap * float(frame.K[0, 0]) / near)
+            come = opened(mask & before.free, own.opening + strip)
+            _take_apart(segmap, mask, carried, come, before, own)
     mended = [i + shift for i in last.mended.intersection(resting)]
     return frame.with_masks(segmap), np.isin(segmap, mended)
 
@@ -81,11 +87,13 @@ def _rests(
     return len(gap) > 0 and float((gap > config.gap).mean()) <= config.moved
 
 
-def _stays(last: Frame, frame: Frame, object_id: int, config: TrackConfig) -> bool:
-    """Whether an object has not moved before a camera that stands, and has a mask, whichever."""
+def _stays(last: Frame, frame: Frame, object_id: int, changed: Mask, config: TrackConfig) -> bool:
+    """Whether an object has not moved before a camera that stands, and has a mask, whichever;
+    changed : pixels (H, W) that have, between the two frames."""
     mask = last.segmap == object_id
-    covered = (mask & (frame.segmap != BACKGROUND)).sum()
-    return bool(covered >= config.overlap * mask.sum()) and same_depth(last, frame, mask, config)
+    if (mask & (frame.segmap != BACKGROUND)).sum() < config.overlap * mask.sum():
+        return False
+    return same_depth(last, frame, mask, config) and not slides(mask, changed, config)
 
 
 def _before(
@@ -102,13 +110,16 @@ def _before(
 
 
 def _take_apart(
-    segmap: NDArray[np.int64], mask: Mask, carried: Mask, before: _Before, config: CarryConfig
+    segmap: NDArray[np.int64],
+    mask: Mask,
+    carried: Mask,
+    may_have_come: Mask,
+    before: _Before,
+    config: CarryConfig,
 ) -> None:
     """What is left of a mask that carried ones cover: what was background is again, what has come
     is an object of its own, and the rest is divided by what is nearest."""
-    groups, count = import_library("scipy.ndimage").label(
-        opened(mask & before.free, config.opening)
-    )
+    groups, count = import_library("scipy.ndimage").label(may_have_come)
     come = np.zeros_like(mask)
     for group in range(1, count + 1):
         if (groups == group).sum() >= config.least_pixels:
