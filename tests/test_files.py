@@ -116,7 +116,7 @@ def test_an_existing_folder_is_refused_before_any_work(tmp_path: Path) -> None:
     (tmp_path / "out").mkdir()
     (tmp_path / "out" / "old").write_bytes(b"old")
     with (
-        pytest.raises(OutputError, match="--overwrite"),
+        pytest.raises(OutputError, match="overwrite=True"),
         atomic_folder(tmp_path / "out", overwrite=False, mark=MARK),
     ):
         pytest.fail("the body ran")

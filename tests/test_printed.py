@@ -54,7 +54,10 @@ def test_a_result_prints_in_ten_lines_without_arrays(count, stored):
     lines = text.splitlines()
     assert len(lines) == min(count + 2, 10)
     assert "array" not in text and "[" not in text
-    assert lines[0].startswith(f"1 of {count} objects of frame.npz; brrp, retrieved by appearance")
+    objects = "object" if count == 1 else "objects"
+    assert lines[0].startswith(
+        f"1 of {count} {objects} of frame.npz; brrp, retrieved by appearance"
+    )
     assert lines[2].split() == ["1", "a", "<b>mug</b>", "0.97", "1.05", "1.2", "ok"]
     if count > 8:
         told = sum(line.split()[0].isdecimal() for line in lines[1:])

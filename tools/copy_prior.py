@@ -44,6 +44,7 @@ from brrp_cli.prior.manifest import (
     write_manifest,
 )
 from brrp_cli.prior.store import Prior, open_prior
+from brrp_cli.spoken import command_line
 
 CHUNK = 1_000
 
@@ -54,6 +55,7 @@ CHUNK = 1_000
 @click.option("-o", "--output", required=True, type=click.Path(path_type=Path))
 @click.option("--strange", is_flag=True, help="Copies that look like nothing that is there.")
 @click.option("--overwrite", is_flag=True)
+@command_line()
 def main(prior_path: Path, objects: int, output: Path, strange: bool, overwrite: bool) -> None:
     """Make a prior of so many OBJECTS in the folder OUTPUT."""
     try:

@@ -62,6 +62,7 @@ from tabletop.scene import LIGHTS, LIMITS, SENSOR_NAMES, Plan, check_depth, make
 
 from brrp_cli.dependencies import import_library
 from brrp_cli.errors import BrrpError, SceneError
+from brrp_cli.spoken import command_line
 
 CHECK_EVERY = 5
 
@@ -131,6 +132,7 @@ def _size(_context: click.Context, _option: click.Parameter, value: str) -> tupl
 @click.option("--overwrite", is_flag=True, help="Replace scenes that are there.")
 @click.option("--check", is_flag=True, help="Only check every scene of OUTPUT; write nothing.")
 @click.option("-o", "--output", required=True, type=click.Path(path_type=Path))
+@command_line()
 def main(
     meshes: Path | None,
     only: tuple[str, ...],
