@@ -1,4 +1,4 @@
-"""How a message names an option: as the user typed it, or would have typed it."""
+"""How a message names an option, as the user typed it or would have, and how it counts."""
 
 from __future__ import annotations
 

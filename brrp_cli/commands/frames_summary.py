@@ -21,9 +21,9 @@ def earlier_frames(
         table = parse_json((output / SUMMARY).read_text(encoding="utf-8"))
         same = table["source"] == source and table["settings"] == plain(settings)
         told = {each["frame"]: each for each in table["frames"]} if same else {}
-    except (OSError, ValueError, KeyError, TypeError):
+        return {name: each for name, each in told.items() if (output / each["folder"]).is_dir()}
+    except (OSError, ValueError, KeyError, TypeError):  # of another version, or damaged
         return {}
-    return {name: each for name, each in told.items() if (output / each["folder"]).is_dir()}
 
 
 def plain(settings: dict[str, Any]) -> dict[str, Any]:

@@ -187,7 +187,7 @@ def grasp(
     written = ", ".join(str(path) for path in paths if path.exists())
     click.echo(
         f"Wrote {counted(len(plan.grasps), 'grasp')} of {held} of"
-        f" {counted(len(plan.objects), 'object')} with the hand {gripper.name},"
+        f" {counted(len(plan.objects), 'object')}, {gripper.name},"
         f" metres, {frame} frame: {written}"
     )
     return plan
