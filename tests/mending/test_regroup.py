@@ -315,14 +315,20 @@ def test_a_stream_mends_what_was_not_corrected_under_the_ids_of_its_tracks(prior
     assert {"green_plate", "red_box"} <= set(taken_for(result).values())
 
 
-def test_what_was_mended_keeps_its_id_and_is_not_tried_again(prior, frame, aside, monkeypatch):
-    tried = []
+@pytest.fixture
+def tried(monkeypatch):
+    """How many masks were tried, call by call."""
+    numbers = []
 
     def counted(frame, masks, *args, **kwargs):
-        tried.append(len(masks))
+        numbers.append(len(masks))
         return try_masks(frame, masks, *args, **kwargs)
 
     monkeypatch.setattr("brrp_cli.session.try_masks", counted)
+    return numbers
+
+
+def test_what_was_mended_keeps_its_id_and_is_not_tried_again(prior, frame, aside, tried):
     made = frame.with_masks(frame.segmap, aside)
     with Reconstructor(prior, retriever="appearance", workers=1, track=True) as session:
         first = session(made)
@@ -336,14 +342,7 @@ def test_what_was_mended_keeps_its_id_and_is_not_tried_again(prior, frame, aside
     assert all(item.posterior is posteriors[item.object_id] for item in second.objects)
 
 
-def test_a_camera_that_hardly_moves_looks_into_no_mask_twice(prior, frame, aside, monkeypatch):
-    tried = []
-
-    def counted(frame, masks, *args, **kwargs):
-        tried.append(len(masks))
-        return try_masks(frame, masks, *args, **kwargs)
-
-    monkeypatch.setattr("brrp_cli.session.try_masks", counted)
+def test_a_camera_that_hardly_moves_looks_into_no_mask_twice(prior, frame, aside, tried):
     nearer = np.eye(4)
     nearer[2, 3] = 0.01
     made = frame.with_masks(frame.segmap, aside)
