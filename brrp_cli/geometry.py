@@ -25,6 +25,17 @@ def transform_points(T_target_source: Array, points: Array) -> Array:
     return points @ T_target_source[:3, :3].T + T_target_source[:3, 3]
 
 
+def inverse(T_target_source: NDArray[np.floating]) -> NDArray[np.float64]:
+    """T_source_target (4, 4)."""
+    return np.asarray(np.linalg.inv(T_target_source), dtype=np.float64)
+
+
+def moved_box(T_target_source: Array, box: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The box (2, 3) along the target frame's axes around a box (2, 3) of the source frame."""
+    corners = np.stack(np.meshgrid(*box.T, indexing="ij"), axis=-1).reshape(-1, 3)
+    return np.stack(bounds(transform_points(T_target_source, corners)))
+
+
 def similarity(
     scale: float = 1.0, rotation: Array | None = None, translation: Array | None = None
 ) -> NDArray[np.float64]:

@@ -6,8 +6,10 @@ file and fails again when the process ends.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any, TypeVar
+
+import numpy as np
 
 if TYPE_CHECKING:
     import h5py
@@ -60,6 +62,16 @@ class SharedParts:
             self._read[name] = read(self._group[name])
         found: T = self._read[name]
         return found
+
+
+def stored_motion(attributes: Mapping[str, Any], name: str) -> NDArray[np.float64] | None:
+    """The attribute T (4, 4) of that name; None where there is none. Errors: ValueError."""
+    if name not in attributes:
+        return None
+    T = np.asarray(attributes[name], dtype=np.float64)
+    if T.shape != (4, 4) or not np.isfinite(T).all():
+        raise ValueError(f"{name} is no transform")
+    return T
 
 
 def write_compressed(group: h5py.Group, name: str, data: NDArray[Any]) -> None:

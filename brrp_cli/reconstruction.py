@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, Protocol
+from typing import TYPE_CHECKING, Any, ClassVar, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -81,6 +81,14 @@ class StoredPosterior(OccupancyPosterior, Protocol):
     def read(cls, group: h5py.Group, shared: SharedParts) -> StoredPosterior:
         """What `write` wrote. Errors: KeyError, ValueError where something is missing or does not
         fit the rest."""
+
+
+@runtime_checkable
+class MovablePosterior(StoredPosterior, Protocol):
+    """A posterior that can be given in another frame."""
+
+    def moved(self, T_target_cam: NDArray[np.float64]) -> StoredPosterior:
+        """The same in the frame that T_target_cam (4, 4), rigid, leads to."""
 
 
 @dataclass(frozen=True, repr=False)

@@ -128,6 +128,13 @@ def _size(_context: click.Context, _option: click.Parameter, value: str) -> tupl
     type=float,
     help="Of cameras about their line of sight, degrees.",
 )
+@click.option(
+    "--orbit",
+    default=0.0,
+    show_default=True,
+    type=click.FloatRange(-180, 180),
+    help="Degrees that the camera goes round from view to view; 0: it stands anywhere.",
+)
 @click.option("--workers", default=1, show_default=True, type=click.IntRange(1))
 @click.option("--overwrite", is_flag=True, help="Replace scenes that are there.")
 @click.option("--check", is_flag=True, help="Only check every scene of OUTPUT; write nothing.")
@@ -156,6 +163,7 @@ def main(
     distance: tuple[float, float],
     elevation: tuple[float, float],
     roll: tuple[float, float],
+    orbit: float,
     workers: int,
     overwrite: bool,
     check: bool,
@@ -211,6 +219,7 @@ def main(
             robot,
             dark_table,
             Standpoint(distance, elevation, roll),
+            orbit,
         )
         _report(list(_make_all(plan, scenes, workers)), output)
     except BrrpError as error:

@@ -62,6 +62,27 @@ class CarryConfig:
 
 
 @dataclass(frozen=True)
+class GlideConfig:
+    """When masks and results hold in a later frame, though the camera has moved.
+
+    side : radians between the two views of an object; near : factor by which its distance differs,
+    both at most
+    same : part that its two masks share, both ways, at least; depth : median of what its depth has
+    changed by at most, on an object at rest: waves of real depth go with the side
+    outside : part of the image that the earlier frame did not show, at most; height : metres above
+    the table from which on what was hidden may be an object; beyond 1 m they grow with the square
+    of depth
+    """
+
+    side: float = 0.1
+    near: float = 1.1
+    same: float = share(0.85)
+    depth: float = 0.004
+    outside: float = share(0.1)
+    height: float = 0.01
+
+
+@dataclass(frozen=True)
 class TrackConfig:
     """Lengths are metres, in the camera frame of the newer image.
 
@@ -80,6 +101,7 @@ class TrackConfig:
     it, and its colours by `still_colour`, of 255
     lost : tracks that are remembered while their object is out of sight
     carry : when masks that were mended hold in the next frame
+    glide : when masks and results hold before a camera that moves a little; None = never
     sharpen : how earlier views of an object join the newest one; None = they do not
     """
 
@@ -96,4 +118,5 @@ class TrackConfig:
     still_colour: float = 10.0
     lost: int = between(16, 0, 1000)
     carry: CarryConfig = field(default_factory=CarryConfig)
+    glide: GlideConfig | None = field(default_factory=GlideConfig)
     sharpen: SharpenConfig | None = field(default_factory=SharpenConfig)

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, ClassVar, Protocol
 
 import numpy as np
 import torch
 from numpy.typing import NDArray
 
+from brrp_cli.geometry import moved_box
 from brrp_cli.inference.mean_grid import MeanGrid
 from brrp_cli.inference.placed_shape import PlacedShape
 from brrp_cli.inference.posterior import LOGISTIC_DEVIATION, HilbertPosterior
@@ -48,6 +49,9 @@ class MeanFunction(Protocol):
     def volume(self, axes: Axes) -> NDArray[np.float32]:
         """m (nx, ny, nz) on a grid of camera-frame coordinates, metres."""
 
+    def moved(self, T_target_cam: NDArray[np.float64]) -> MeanFunction:
+        """The same in another frame, which T_target_cam (4, 4), rigid, leads to."""
+
     def write(self, group: h5py.Group, shared: SharedParts) -> None:
         """Into a group of its own."""
 
@@ -76,6 +80,16 @@ class HypothesisPosterior:
     def bounds(self) -> NDArray[np.float64]:
         """(2, 3) metres, camera frame."""
         return self.box
+
+    def moved(self, T_target_cam: NDArray[np.float64]) -> HypothesisPosterior:
+        """The same in another frame, which T_target_cam (4, 4), rigid, leads to. Its box is the one
+        around this one's."""
+        return replace(
+            self,
+            means=tuple(mean.moved(T_target_cam) for mean in self.means),
+            correction=self.correction.moved(T_target_cam),
+            box=moved_box(T_target_cam, self.box),
+        )
 
     @property
     def weights(self) -> NDArray[np.float64]:

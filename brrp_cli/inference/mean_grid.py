@@ -1,15 +1,16 @@
-"""A prior mean function that is kept on a grid in the camera frame: that of a completed shape."""
+"""A prior mean function that is kept on a grid: that of a completed shape."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import map_coordinates
 
-from brrp_cli.hdf5 import write_compressed
+from brrp_cli.geometry import inverse, moved_box, transform_points
+from brrp_cli.hdf5 import stored_motion, write_compressed
 from brrp_cli.reconstruction import Axes
 
 if TYPE_CHECKING:
@@ -23,9 +24,10 @@ _AXES = range(3)
 
 @dataclass(frozen=True)
 class MeanGrid:
-    """Logits at the nodes lower + spacing * (i, j, k), metres, camera frame.
+    """Logits at the nodes lower + spacing * (i, j, k), metres, in the grid's frame.
 
     lower : (3,); spacing : > 0; values : (nx, ny, nz) float16; outside : logit off the grid
+    T_cam_grid : (4, 4) rigid, from the grid's frame; None where that is the camera frame
     """
 
     kind: ClassVar[str] = "grid"
@@ -34,22 +36,35 @@ class MeanGrid:
     spacing: float
     values: NDArray[np.float16]
     outside: float
+    T_cam_grid: Array | None = None
 
     @property
     def bounds(self) -> Array:
-        """(2, 3) metres, camera frame: the first and the last node."""
+        """(2, 3) metres, camera frame: around the first and the last node."""
         upper = self.lower + self.spacing * (np.array(self.values.shape) - 1)
-        return np.stack([self.lower, upper])
+        box = np.stack([self.lower, upper])
+        return box if self.T_cam_grid is None else moved_box(self.T_cam_grid, box)
+
+    def moved(self, T_target_cam: Array) -> MeanGrid:
+        """The same in another frame, which T_target_cam (4, 4), rigid, leads to."""
+        T = T_target_cam if self.T_cam_grid is None else T_target_cam @ self.T_cam_grid
+        return replace(self, T_cam_grid=T)
 
     def logits(self, points: NDArray[np.floating]) -> NDArray[np.float32]:
         """m (n,) at points (n, 3), metres, camera frame; trilinear."""
-        at = ((np.asarray(points, dtype=np.float64) - self.lower) / self.spacing).T
+        points = np.asarray(points, dtype=np.float64)
+        if self.T_cam_grid is not None:
+            points = transform_points(inverse(self.T_cam_grid), points)
+        at = ((points - self.lower) / self.spacing).T
         values = self.values.astype(np.float32)
         return np.asarray(map_coordinates(values, at, order=1, mode="constant", cval=self.outside))
 
     def volume(self, axes: Axes) -> NDArray[np.float32]:
         """m (nx, ny, nz) on a grid along the camera's axes, metres: `logits` one axis after the
-        other, a tenth of the steps."""
+        other, a tenth of the steps, where these are the grid's axes, too."""
+        if self.T_cam_grid is not None:
+            nodes = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
+            return self.logits(nodes.reshape(-1, 3)).reshape(nodes.shape[:3])
         values = self.values.astype(np.float32)
         within = []
         for number, axis in enumerate(axes):
@@ -67,7 +82,10 @@ class MeanGrid:
         return np.where(inside, values, np.float32(self.outside))
 
     def write(self, group: h5py.Group, shared: SharedParts) -> None:
-        """Attributes lower (3), spacing, outside; values (nx, ny, nz) float16."""
+        """Attributes lower (3), spacing, outside, T_cam_grid (4, 4) where there is one; values (nx,
+        ny, nz) float16."""
+        if self.T_cam_grid is not None:
+            group.attrs["T_cam_grid"] = self.T_cam_grid
         group.attrs.update({"lower": self.lower, "spacing": self.spacing, "outside": self.outside})
         write_compressed(group, "values", self.values)
 
@@ -79,6 +97,7 @@ class MeanGrid:
             spacing=float(group.attrs["spacing"]),
             values=np.asarray(group["values"], dtype=np.float16),
             outside=float(group.attrs["outside"]),
+            T_cam_grid=stored_motion(group.attrs, "T_cam_grid"),
         )
 
 

@@ -6,7 +6,7 @@ evaluated in the model's own frame: exact within the band where the logit is not
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
@@ -63,6 +63,16 @@ class PlacedShape:
     def unit(self) -> float:
         """Metres of one unit of the shape's coordinates."""
         return float(np.cbrt(np.linalg.det(self.T_cam_shape[:3, :3])))
+
+    def moved(self, T_target_cam: Array) -> PlacedShape:
+        """The same in another frame, which T_target_cam (4, 4), rigid, leads to."""
+        turn = np.kron(np.eye(2), T_target_cam[:3, :3])
+        return replace(
+            self,
+            T_cam_shape=T_target_cam @ self.T_cam_shape,
+            covariance=turn @ self.covariance @ turn.T,
+            alike=T_target_cam @ self.alike,
+        )
 
     @property
     def vertices(self) -> Array:

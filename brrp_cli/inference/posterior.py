@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 import torch
 from numpy.typing import NDArray
 
+from brrp_cli.geometry import inverse, moved_box, transform_points
+from brrp_cli.hdf5 import stored_motion
 from brrp_cli.inference.hinge import HingeGrid, factors, grid_logits
 from brrp_cli.reconstruction import LOGIT_VARIANCE, Axes
 
@@ -27,8 +29,11 @@ CHUNK = 2_048
 class HilbertPosterior:
     """Particles over the weights of a Hilbert map around one object.
 
-    weights : (P, H + 1) float32; center : (3,) float64, metres, camera frame, centre of the hinge
-    grid; reach : half-width of the cube in which samples constrained the map, metres.
+    weights : (P, H + 1) float32; center : (3,) float64, metres, centre of the hinge grid, which
+    lies along the axes of the map's frame; reach : half-width of the cube in which samples
+    constrained the map, metres
+    T_cam_map : (4, 4) rigid, from the map's frame, in which it was inferred; None where that is the
+    camera frame
     """
 
     kind: ClassVar[str] = "hilbert_map"
@@ -37,16 +42,26 @@ class HilbertPosterior:
     center: NDArray[np.float64]
     grid: HingeGrid
     reach: float
+    T_cam_map: NDArray[np.float64] | None = None
 
     @property
     def bounds(self) -> NDArray[np.float64]:
-        """(2, 3) metres, camera frame: the cube outside of which no sample was drawn."""
-        return np.stack([self.center - self.reach, self.center + self.reach])
+        """(2, 3) metres, camera frame: around the cube outside of which no sample was drawn."""
+        cube = np.stack([self.center - self.reach, self.center + self.reach])
+        return cube if self.T_cam_map is None else moved_box(self.T_cam_map, cube)
+
+    def moved(self, T_target_cam: NDArray[np.float64]) -> HilbertPosterior:
+        """The same in another frame, which T_target_cam (4, 4), rigid, leads to."""
+        T = T_target_cam if self.T_cam_map is None else T_target_cam @ self.T_cam_map
+        return replace(self, T_cam_map=T)
 
     def logits(self, points: NDArray[np.floating]) -> NDArray[np.float32]:
         """w . phi (P, n) at points (n, 3), metres, camera frame."""
+        points = np.asarray(points, np.float64)
+        if self.T_cam_map is not None:
+            points = transform_points(inverse(self.T_cam_map), points)
         # Centre in float64: kernels of centimetres leave no room for float32 far from the origin.
-        local = torch.from_numpy((np.asarray(points, np.float64) - self.center).astype(np.float32))
+        local = torch.from_numpy((points - self.center).astype(np.float32))
         weights = torch.from_numpy(self.weights)
         parts = [factors(part, self.grid).dot(weights[:, 1:]) for part in local.split(CHUNK)]
         return np.asarray((torch.cat(parts, dim=1) + weights[:, :1]).numpy())
@@ -74,6 +89,9 @@ class HilbertPosterior:
 
     def logit_volume(self, axes: Axes) -> NDArray[np.float32]:
         """w . phi (P, nx, ny, nz) on a grid of camera-frame coordinates, metres."""
+        if self.T_cam_map is not None:
+            nodes = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
+            return self.logits(nodes.reshape(-1, 3)).reshape(-1, *nodes.shape[:3])
         local = tuple(
             torch.from_numpy((np.asarray(axis, np.float64) - middle).astype(np.float32))
             for axis, middle in zip(axes, self.center, strict=True)
@@ -89,7 +107,9 @@ class HilbertPosterior:
 
     def write(self, group: h5py.Group, shared: SharedParts) -> None:
         """Attributes center (3), reach, hinge_lower (3), hinge_counts (3), hinge_spacing and
-        feature_floor; weights (P, H + 1) float32."""
+        feature_floor, T_cam_map (4, 4) where there is one; weights (P, H + 1) float32."""
+        if self.T_cam_map is not None:
+            group.attrs["T_cam_map"] = self.T_cam_map
         group.attrs["center"] = self.center
         group.attrs["reach"] = self.reach
         group.attrs["hinge_lower"] = self.grid.lower
@@ -116,6 +136,7 @@ class HilbertPosterior:
                 float(attributes["feature_floor"]),
             ),
             reach=float(attributes["reach"]),
+            T_cam_map=stored_motion(attributes, "T_cam_map"),
         )
 
 

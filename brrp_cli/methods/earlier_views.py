@@ -20,7 +20,7 @@ from brrp_cli.completion.seen_surface import Bounds, SeenSurface
 from brrp_cli.config import HypothesesConfig, MeanConfig
 from brrp_cli.config.tracking import SharpenConfig
 from brrp_cli.frames.frame import Frame
-from brrp_cli.geometry import normalise, transform_points
+from brrp_cli.geometry import inverse, normalise, transform_points
 from brrp_cli.kin.evidence import OtherDepth
 from brrp_cli.methods.base import EarlierView
 from brrp_cli.observation.ray_samples import ObjectObservation
@@ -159,7 +159,7 @@ class EarlierViews:
             tuple(
                 View(
                     v.T_now_then,
-                    _inverse(v.T_now_then),
+                    inverse(v.T_now_then),
                     cast(Remembered, v.memory),
                 )
                 for v in views
@@ -307,7 +307,7 @@ class EarlierViews:
             return True
         now = begun[was.name][0]
         surface = _moved(view.T_now_then @ was.T_cam_model, now.model.surface[:points])
-        local = _moved(_inverse(now.T_cam_model), surface)
+        local = _moved(inverse(now.T_cam_model), surface)
         return bool(np.abs(now.model.signed_distance(local)).mean() <= self.config.agree)
 
 
@@ -317,7 +317,3 @@ ALONE = EarlierViews((), SharpenConfig())
 
 def _moved(T_target_source: Array, points: NDArray[np.floating]) -> Array:
     return np.asarray(transform_points(T_target_source, points), dtype=np.float64)
-
-
-def _inverse(T: Array) -> Array:
-    return np.asarray(np.linalg.inv(T), dtype=np.float64)

@@ -30,6 +30,11 @@ class Plane:
         model = model if model[3] > 0 else -model
         return cls(model[:3].copy(), float(model[3]))
 
+    def moved(self, T_target_cam: NDArray[np.float64]) -> Plane:
+        """The same in another frame, which T_target_cam (4, 4), rigid, leads to."""
+        normal = T_target_cam[:3, :3] @ self.normal
+        return Plane(normal, float(self.offset - normal @ T_target_cam[:3, 3]))
+
     def signed_distance(self, points: NDArray[np.floating]) -> NDArray[np.float64]:
         """(...,) metres above the plane of points (..., 3), camera frame."""
         return np.asarray(points @ self.normal + self.offset, dtype=np.float64)

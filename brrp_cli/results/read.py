@@ -18,7 +18,6 @@ from brrp_cli.errors import ConfigError, ResultError
 from brrp_cli.files import parse_json
 from brrp_cli.frames.frame import Frame
 from brrp_cli.frames.npz import load_frame
-from brrp_cli.geometry import transform_points
 from brrp_cli.notebook import picture_html, result_html
 from brrp_cli.observation.support_plane import Plane
 from brrp_cli.reconstruction import StoredPosterior, Surface
@@ -110,9 +109,7 @@ class StoredResult:
         plane = self.plane_cam
         if plane is None:
             return None
-        on_plane = transform_points(self.T_frame_cam, -plane.offset * plane.normal)
-        normal = self.T_frame_cam[:3, :3] @ plane.normal
-        return Plane(normal, float(-normal @ on_plane))
+        return plane.moved(self.T_frame_cam)
 
     @property
     def surface_config(self) -> SurfaceConfig:

@@ -17,7 +17,7 @@ from brrp_cli.dependencies import import_library
 from brrp_cli.frames.dilate import opened
 from brrp_cli.frames.frame import BACKGROUND, Frame
 from brrp_cli.frames.projection import at_pixels, depth_behind
-from brrp_cli.geometry import transform_points
+from brrp_cli.geometry import inverse, transform_points
 from brrp_cli.tracking.followed import Followed
 from brrp_cli.tracking.motion import camera_motion, same_depth, stands
 from brrp_cli.tracking.unchanged import changed_pixels, slides
@@ -54,14 +54,14 @@ def with_carried(
     if T_now_last is None:
         return frame, nowhere
     own = config.carry
-    resting = [i for i in sorted(last.mended) if _rests(last.frame, frame, T_now_last, i, own)]
+    resting = [i for i in sorted(last.mended) if rests(last.frame, frame, T_now_last, i, own)]
     if stands(T_now_last, config) and last.frame.shape == frame.shape:
         others = set(last.frame.object_ids) - last.mended
         changed = changed_pixels(last.frame, frame, config)
         resting += [i for i in sorted(others) if _stays(last.frame, frame, i, changed, config)]
     if not resting:
         return frame, nowhere
-    before = _before(last.frame, frame, np.asarray(np.linalg.inv(T_now_last)), own)
+    before = _before(last.frame, frame, inverse(T_now_last), own)
     open_ = ~np.isin(segmap, list(fixed))
     carried = np.isin(before.labels, resting) & open_
     shift = int(segmap.max())
@@ -78,7 +78,7 @@ def with_carried(
     return frame.with_masks(segmap), np.isin(segmap, mended)
 
 
-def _rests(
+def rests(
     last: Frame, frame: Frame, T_now_last: NDArray[np.float64], object_id: int, config: CarryConfig
 ) -> bool:
     """Whether an object is where it was, as far as this frame sees its place."""

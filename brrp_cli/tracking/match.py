@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from brrp_cli.config.tracking import TrackConfig
 from brrp_cli.frames.frame import Frame
 from brrp_cli.frames.projection import at_pixels, depth_behind
-from brrp_cli.geometry import transform_points
+from brrp_cli.geometry import inverse, transform_points
 
 
 def match(
@@ -71,6 +71,17 @@ def seen_again(
     # Where there is no depth nobody can tell.
     there = ~(gap > near) & ~(gap < -max(near, thickness(points)))
     return float((there & (at_pixels(moved, frame.segmap, frame) == new)).mean())
+
+
+def shared(
+    then: Frame, now: Frame, T_now_then: NDArray[np.float64], object_id: int, near: float
+) -> float:
+    """Share of an object's points in either frame that the other one shows, the lower of both;
+    near : as in `seen_again`."""
+    return min(
+        seen_again(then, now, T_now_then, object_id, object_id, near),
+        seen_again(now, then, inverse(T_now_then), object_id, object_id, near),
+    )
 
 
 def thickness(points: NDArray[np.floating]) -> float:

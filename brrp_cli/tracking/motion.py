@@ -8,10 +8,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from brrp_cli.config.tracking import SharpenConfig, TrackConfig
+from brrp_cli.config.tracking import GlideConfig, SharpenConfig, TrackConfig
 from brrp_cli.frames.frame import BACKGROUND, Frame
 from brrp_cli.frames.projection import at_pixels, depth_behind
-from brrp_cli.geometry import transform_points
+from brrp_cli.geometry import inverse, normalise, transform_points
 
 
 def unmoved(before: Frame, frame: Frame, config: TrackConfig) -> frozenset[int]:
@@ -33,7 +33,7 @@ def at_rest(
 ) -> bool:
     """Whether an object of two frames of one stream, whose camera has moved by T_now_then (4, 4),
     is where it was, as far as both show it."""
-    T_then_now = np.asarray(np.linalg.inv(T_now_then))
+    T_then_now = inverse(T_now_then)
     return all(
         _agrees(one, other, T, object_id, config)
         for one, other, T in ((before, frame, T_now_then), (frame, before, T_then_now))
@@ -88,6 +88,14 @@ def camera_motion(last: Frame, frame: Frame, config: TrackConfig) -> NDArray[np.
     return np.eye(4) if same and colour <= config.still_colour else None
 
 
+def turned(points: NDArray[np.floating], T_now_then: NDArray[np.float64]) -> float:
+    """Radians between the directions in which a camera that has moved by T_now_then (4, 4) saw the
+    middle of points (n, 3), camera frame, then and now."""
+    middle = np.median(points, axis=0).astype(np.float64)
+    now, then = normalise(np.stack([-middle, T_now_then[:3, 3] - middle]))
+    return float(np.arccos(np.clip(now @ then, -1, 1)))
+
+
 def stands(T: NDArray[np.float64], config: TrackConfig) -> bool:
     """Whether a camera that has moved by T (4, 4) stands, as poses go."""
     turned = np.linalg.norm(T[:3, :3] - np.eye(3))
@@ -107,13 +115,35 @@ def _unmoved(last: Frame, frame: Frame, object_id: int, config: TrackConfig) -> 
 def same_depth(last: Frame, frame: Frame, mask: NDArray[np.bool_], config: TrackConfig) -> bool:
     """Whether depth within a mask (H, W) is what it was, in images of one camera that stands."""
     both = mask & last.valid & frame.valid
-    if not both.any():
+    return same_gap(frame.depth[both] - last.depth[both], last.depth[both], config.still, config)
+
+
+def same_gap(
+    apart: NDArray[np.floating], depth: NDArray[np.floating], most: float, config: TrackConfig
+) -> bool:
+    """Whether differences (n,) of depth, metres, at so many points are those of noise.
+
+    most : their median, metres, at most
+    """
+    if not len(apart):
         return False
-    apart = frame.depth[both] - last.depth[both]
     # Noise of single pixels is no motion: the middle of their differences tells of it.
     shifted = abs(float(np.median(apart)))
-    scattered = float(np.median(np.abs(apart) / noisier(last.depth[both])))
-    return shifted <= config.still and scattered <= config.noise
+    scattered = float(np.median(np.abs(apart) / noisier(depth)))
+    return shifted <= most and scattered <= config.noise
+
+
+def same_side(
+    points: NDArray[np.floating], T_now_then: NDArray[np.float64], config: GlideConfig
+) -> bool:
+    """Whether a camera that has moved by T_now_then (4, 4) sees points (n, 3) of its earlier frame
+    from about the same side and as near."""
+    if not len(points):
+        return False
+    then = np.median(points, axis=0).astype(np.float64)
+    now = transform_points(T_now_then, then)
+    factor = float(np.linalg.norm(now) / np.linalg.norm(then))
+    return turned(now[None], T_now_then) <= config.side and 1 / config.near <= factor <= config.near
 
 
 def noisier(depth: NDArray[np.floating]) -> NDArray[np.floating]:

@@ -17,12 +17,15 @@ from brrp_cli.geometry import normalise
 from brrp_cli.mending.again import Objects
 from brrp_cli.mending.strangers import of_left_out
 from brrp_cli.methods.base import EarlierView, Memory, Stream
+from brrp_cli.observation.support_plane import Plane
 from brrp_cli.reconstruction import ObjectReconstruction, Reconstruction
 from brrp_cli.segmentation.mend_masks import changed_masks
 from brrp_cli.tracking.carried import with_carried
 from brrp_cli.tracking.followed import Followed, first_frame, follow, not_tried, with_known
+from brrp_cli.tracking.glided import glided
 from brrp_cli.tracking.lost import Lost, lost_tracks
-from brrp_cli.tracking.motion import at_rest, camera_motion, spread_out, unmoved
+from brrp_cli.tracking.motion import at_rest, camera_motion, spread_out, stands, unmoved
+from brrp_cli.tracking.moved import holds, moved_object
 from brrp_cli.tracking.renamed import new_names, with_names
 from brrp_cli.tracking.tried import tried_before
 from brrp_cli.tracking.unchanged import unchanged
@@ -70,8 +73,8 @@ class Tracker:
     def __init__(self, config: TrackConfig, least_part: float) -> None:
         self._config, self._least_part = config, least_part
         self._last: Followed | None = None
-        # The frame that masks were made of last.
-        self._masked: Frame | None = None
+        # The frame that masks were made of last, with these, and its support plane.
+        self._masked: tuple[Frame, Plane | None] | None = None
         # Frames, and what was inferred from each and still holds.
         self._made: list[tuple[Frame, Reconstruction]] = []
         # Of each object, the frame in whose mask of it others were looked for.
@@ -110,19 +113,16 @@ class Tracker:
             mended |= set(changed_masks(result.frame.segmap, seen.segmap, self._least_part))
         next_id = max(followed.next_id, max(result.frame.object_ids) + 1)
         aside = None if made is None else made.aside
-        self._masked = None if made is None else frame
+        self._masked = None if made is None else (result.frame, result.plane)
         self._last = self._followed(result.frame, next_id, frozenset(mended), aside)
         return result
 
     def again(self, frame: Frame, everything: Infer) -> Reconstruction | None:
-        """All objects of a frame without masks, under the masks of the last one, where nothing has
-        changed since these were made; else None."""
+        """All objects of a frame without masks, under those that were made last, where these hold;
+        else None."""
         start, last = time.perf_counter(), self._last
-        if last is None or self._masked is None or frame.shape != last.frame.shape:
-            return None
-        seen = frame.with_masks(last.frame.segmap)
-        masked = self._masked.with_masks(last.frame.segmap)
-        if not unchanged(masked, seen, self._config):
+        seen = self._masked_as_before(frame)
+        if last is None or seen is None:
             return None
         kept = self._kept(seen)
         seconds = time.perf_counter() - start
@@ -131,17 +131,32 @@ class Tracker:
         result = self._inferred(seen, kept, todo, partial(everything, stream=stream))
         result.seconds["tracking"] = seconds
         self._keep(result, kept, stream)
-        self._last = replace(last, frame=seen)
+        lost = lost_tracks(last.frame, last.lost, seen, self._config)
+        self._last = replace(last, frame=seen, lost=lost)
         return result
+
+    def _masked_as_before(self, frame: Frame) -> Frame | None:
+        """The frame with the masks that were made last; None where they do not hold."""
+        if self._masked is None or frame.shape != self._masked[0].shape:
+            return None
+        masked, plane = self._masked
+        if unchanged(masked, frame, self._config):
+            return frame.with_masks(masked.segmap)
+        return glided(masked, frame, plane, self._config)
 
     def _inferred(
         self, seen: Frame, kept: list[ObjectReconstruction], todo: Collection[int], infer: Objects
     ) -> Reconstruction:
         """What was kept, and the objects `todo` as they are inferred now."""
-        if todo or not self._made:
+        T = camera_motion(self._made[0][0], seen, self._config) if self._made else None
+        if todo or T is None:
             result = infer(seen, only=todo)
         else:
-            result = replace(self._made[0][1], frame=seen, objects=[], seconds={}, image=None)
+            made = self._made[0][1]
+            plane = made.plane
+            if plane is not None and not stands(T, self._config):
+                plane = plane.moved(T)
+            result = replace(made, frame=seen, objects=[], plane=plane, seconds={}, image=None)
         objects = sorted([*result.objects, *kept], key=lambda item: item.object_id)
         return replace(result, objects=objects)
 
@@ -169,13 +184,29 @@ class Tracker:
         kept = []
         # Held to the frame that they were inferred from: what creeps is found in the end.
         for before, result in self._made:
-            still = unmoved(before, seen, self._config)
-            kept += [
-                replace(each, seconds={})
-                for each in result.reconstructed
-                if each.object_id in still
-            ]
+            T = camera_motion(before, seen, self._config)
+            if T is None:
+                continue
+            if stands(T, self._config):
+                still = unmoved(before, seen, self._config)
+                same = [each for each in result.reconstructed if each.object_id in still]
+            else:
+                same = self._carried_along(before, result, seen, T)
+            kept += [replace(each, seconds={}) for each in same]
         return kept
+
+    def _carried_along(
+        self, before: Frame, result: Reconstruction, seen: Frame, T: NDArray[np.float64]
+    ) -> list[ObjectReconstruction]:
+        """What was made of objects at rest that a camera that has moved by T (4, 4) sees from about
+        the same side, in its frame."""
+        here = set(seen.object_ids)
+        moved = [
+            moved_object(each, T)
+            for each in result.reconstructed
+            if each.object_id in here and holds(before, seen, T, each.object_id, self._config)
+        ]
+        return [each for each in moved if each is not None]
 
     def _renamed(
         self, result: Reconstruction, followed: Followed, corrected: Collection[int]

@@ -9,9 +9,8 @@ from numpy.typing import NDArray
 
 from brrp_cli.config.tracking import TrackConfig
 from brrp_cli.frames.frame import Frame
-from brrp_cli.geometry import normalise
-from brrp_cli.tracking.match import seen_again
-from brrp_cli.tracking.motion import camera_motion
+from brrp_cli.tracking.match import shared
+from brrp_cli.tracking.motion import camera_motion, turned
 
 
 def tried_before(tried: Mapping[int, Frame], now: Frame, config: TrackConfig) -> set[int]:
@@ -36,16 +35,6 @@ def _same_view(
     then: Frame, now: Frame, T_now_then: NDArray[np.float64], object_id: int, config: TrackConfig
 ) -> bool:
     points = now.object_points(object_id)
-    if not len(points):
+    if not len(points) or turned(points, T_now_then) > config.carry.side:
         return False
-    middle = np.median(points, axis=0).astype(np.float64)
-    toward = normalise(np.stack([-middle, T_now_then[:3, 3] - middle]))
-    if float(np.arccos(np.clip(toward[0] @ toward[1], -1, 1))) > config.carry.side:
-        return False
-    back = np.asarray(np.linalg.inv(T_now_then))
-    near = config.carry.gap
-    shared = (
-        seen_again(then, now, T_now_then, object_id, object_id, near),
-        seen_again(now, then, back, object_id, object_id, near),
-    )
-    return min(shared) >= config.carry.same
+    return shared(then, now, T_now_then, object_id, config.carry.gap) >= config.carry.same

@@ -3,13 +3,14 @@ that method registered, in this process and in the workers that it starts."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import ClassVar
 
 import numpy as np
 
 from brrp_cli.config import SurfaceConfig
+from brrp_cli.geometry import transform_points
 from brrp_cli.methods.base import Method, Setup
 from brrp_cli.methods.configuration import as_record
 from brrp_cli.methods.each_object import with_surface
@@ -42,6 +43,9 @@ class Sphere:
     def bounds(self):
         reach = self.radius + 10 * float(self.width)
         return np.stack([self.center - reach, self.center + reach])
+
+    def moved(self, T_target_cam):
+        return replace(self, center=transform_points(T_target_cam, self.center))
 
     def probability(self, points):
         way = self.radius - np.linalg.norm(np.asarray(points) - self.center, axis=-1)

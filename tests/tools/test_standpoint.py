@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from tabletop.camera import Standpoint, draw_camera
+from tabletop.camera import Standpoint, draw_camera, gone_round
 
 from brrp_cli.errors import SceneError
 
@@ -71,3 +71,14 @@ def test_upright_cameras_draw_no_roll():
 def test_ranges_in_which_no_camera_stands_are_told(ranges, named):
     with pytest.raises(SceneError, match=named):
         Standpoint(**ranges)
+
+
+def test_a_camera_that_goes_round_keeps_its_height_and_what_it_looks_at():
+    rng = np.random.default_rng(5)
+    first = draw_camera(CENTER, SIZE, rng, Standpoint(roll=(-40.0, 40.0)))
+    quarter = gone_round(first, CENTER, 90.0)
+    way, gone = place(first.view) - CENTER, place(quarter.view) - CENTER
+    np.testing.assert_allclose(gone, [-way[1], way[0], way[2]], atol=1e-12)
+    at = np.append(CENTER, 1.0)
+    np.testing.assert_allclose(quarter.view @ at, first.view @ at, atol=1e-12)
+    np.testing.assert_allclose(gone_round(quarter, CENTER, -90.0).view, first.view, atol=1e-12)

@@ -71,6 +71,15 @@ def draw_camera(
     return Camera(view, perspective(size))
 
 
+def gone_round(camera: Camera, center: NDArray[np.float64], degrees: float) -> Camera:
+    """The camera after it has gone round `center` (3,), at its height, by so many degrees."""
+    turn, middle = np.eye(4), np.eye(4)
+    # The world turns the other way.
+    turn[:3, :3] = _rolled(-degrees)
+    middle[:3, 3] = center
+    return Camera(camera.view @ middle @ turn @ np.linalg.inv(middle), camera.projection)
+
+
 def perspective(size: tuple[int, int]) -> NDArray[np.float64]:
     """OpenGL projection (4, 4) for an image of `size` (width, height)."""
     width, height = size

@@ -16,7 +16,7 @@ from brrp_cli.files import atomic_folder
 from brrp_cli.frames.published import depth_from_buffer, intrinsics_from_projection
 from brrp_cli.seeds import child_rng
 from tabletop.bin import Bin, draw_bin
-from tabletop.camera import FAR, NEAR, Camera, Standpoint, draw_camera
+from tabletop.camera import FAR, NEAR, Camera, Standpoint, draw_camera, gone_round
 from tabletop.check import (
     CLEAN,
     STRUCTURED_LIGHT,
@@ -53,7 +53,8 @@ class Plan:
     `binned`: in a bin; `walled`: a wall stands behind them, as the first camera sees them;
     `shelved`: they stand in a shelf; `robot`: an arm reaches in over them, from a side on which
     the first camera is not; `dark_table`: it is black and shiny; `standpoint`: where
-    cameras stand."""
+    cameras stand; `orbit`: degrees by which the camera goes round from one view to the next, 0:
+    each stands anywhere."""
 
     meshes: tuple[Path, ...]
     data_root: Path
@@ -73,6 +74,7 @@ class Plan:
     robot: bool = False
     dark_table: bool = False
     standpoint: Standpoint = field(default_factory=Standpoint)
+    orbit: float = 0.0
 
 
 def check_depth(folder: Path, data_root: Path, noise: str, sensor: str) -> list[Distance]:
@@ -105,9 +107,13 @@ def make_scene(plan: Plan, number: int, check: bool) -> list[Distance]:
     centers = [pose.apply(model.center[None])[0] for pose, model in zip(poses, models, strict=True)]
     center = np.mean(centers, axis=0)
     azimuth = (0.0, 2 * np.pi) if shelf is None else shelf.azimuth
-    cameras = [
-        draw_camera(center, plan.size, rng, plan.standpoint, azimuth) for _ in range(plan.views)
-    ]
+    if plan.orbit:
+        first = draw_camera(center, plan.size, rng, plan.standpoint, azimuth)
+        cameras = [gone_round(first, center, plan.orbit * view) for view in range(plan.views)]
+    else:
+        cameras = [
+            draw_camera(center, plan.size, rng, plan.standpoint, azimuth) for _ in range(plan.views)
+        ]
     hulls = [
         pose.apply(model.hull + model.center) for pose, model in zip(poses, models, strict=True)
     ]
