@@ -124,6 +124,9 @@ class Reconstructor:
 
     def _reconstructed(self, frame: Frame) -> Reconstruction:
         start = time.perf_counter()
+        if self._tracker is not None:
+            frame = self._tracker.posed(frame)
+        found = time.perf_counter() - start
         made = not frame.object_ids or frame.aside is not None
         masked, aside = frame.with_masks(frame.segmap), frame.aside
         if not frame.object_ids:
@@ -131,12 +134,14 @@ class Reconstructor:
                 same = self._tracker.again(masked, self._all)
                 if same is not None:
                     same.seconds["masks"] = 0.0
+                    same.seconds["tracking"] += found
                     return replace(same, segmentation=asdict(self._segmentation))
             masked, aside = self._with_masks(frame)
-        seconds = time.perf_counter() - start
+        seconds = time.perf_counter() - start - found
         if self._tracker is not None:
             theirs = Made(aside, frame.corrected) if made else None
             result = self._tracker(masked, theirs, self._all, self._mended)
+            result.seconds["tracking"] += found
         else:
             result = self._all(masked)
             if made:

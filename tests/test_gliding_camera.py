@@ -78,7 +78,7 @@ def test_what_is_seen_otherwise_is_inferred(changed, inferred):
     assert (len(inferred[1]) == 3) == (places is START)
 
 
-def test_without_poses_without_glide_and_where_nothing_can_be_moved_all_is_inferred(
+def test_without_odometry_without_glide_and_where_nothing_can_be_moved_all_is_inferred(
     inferred, monkeypatch
 ):
     def asked(track, **kwargs):
@@ -89,7 +89,8 @@ def test_without_poses_without_glide_and_where_nothing_can_be_moved_all_is_infer
         return len(inferred)
 
     assert asked(TRACK) == 1
-    assert asked(TRACK, known=False) == 2
+    assert asked(TRACK, known=False) == 1
+    assert asked(replace(TRACK, odometry=None), known=False) == 2
     assert asked(replace(TRACK, glide=None)) == 2
     monkeypatch.delattr(Sphere, "moved")
     assert asked(TRACK) == 2

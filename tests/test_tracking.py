@@ -178,7 +178,7 @@ def earlier(inferred, monkeypatch):
 
 
 def test_an_object_at_rest_is_remembered_and_one_that_moved_forgotten(earlier):
-    config = TrackConfig(sharpen=SharpenConfig(views=3))
+    config = TrackConfig(sharpen=SharpenConfig(views=3), glide=None)
     session = Reconstructor(method="sphere", track=config)
     first = session(scene(START, yaw=0.4, known=True))
     assert earlier[0].earlier == {}

@@ -1,14 +1,14 @@
 """How well does a session follow objects through a stream without masks?
 
-    python tools/measure_stream.py SCENES... --prior PRIOR [--times 2]
+    python tools/measure_stream.py SCENES... --prior PRIOR [--times 2] [--no-poses]
 
 Each made scene (published layout, `tools/make_scenes.py --views 4`) is one stream: all its views,
 each `--times` times, with white noise of 1 mm at 1 m that grows with the square of depth from the
-second time on. Masks are made from depth. Printed for first views, for views that are seen again
-and for other views, each with a session that tracks and with one that does not: CPU seconds a
-frame; true objects whose mask is found (IoU over 0.7); of those that were found before, how many
-have their id, and how many have another object's; how many are recognised as what they are, and as
-what they are not.
+second time on. Masks are made from depth. With `--no-poses` no frame tells where its camera was.
+Printed for first views, for views that are seen again and for other views, each with a session
+that tracks and with one that does not: CPU seconds a frame; true objects whose mask is found (IoU
+over 0.7); of those that were found before, how many have their id, and how many have another
+object's; how many are recognised as what they are, and as what they are not.
 """
 
 from __future__ import annotations
@@ -58,13 +58,17 @@ def fits(true: np.ndarray, found: np.ndarray) -> dict[int, int]:
     }
 
 
-def follow(session: Any, scene: Scene, times: int, seed: int) -> dict[str, Counter[str]]:
+def follow(
+    session: Any, scene: Scene, times: int, seed: int, poses: bool = True
+) -> dict[str, Counter[str]]:
     """What became of one scene's objects, by kind of frame."""
     told: dict[str, Counter[str]] = {kind: Counter() for kind in KINDS}
     ids: dict[int, int] = {}
     for view in range(len(scene.views)):
         shown = scene.view(view)
         bare = shown.with_masks(np.zeros_like(shown.segmap))
+        if not poses:
+            bare = replace(bare, T_world_cam=None)
         for again in range(times):
             row = told[KINDS[1] if again else KINDS[2] if view else KINDS[0]]
             frame = noisy(bare, child_rng(seed, scene.name, view, again)) if again else bare
@@ -97,14 +101,17 @@ def follow(session: Any, scene: Scene, times: int, seed: int) -> dict[str, Count
 @click.option("--times", type=click.IntRange(1), default=2, show_default=True)
 @click.option("--seed", type=click.IntRange(0), default=0, show_default=True)
 @click.option("--workers", type=click.IntRange(1), default=1, show_default=True)
-def main(scenes: tuple[Path, ...], prior: Path, times: int, seed: int, workers: int) -> None:
+@click.option("--poses/--no-poses", default=True, show_default=True, help="Of the cameras.")
+def main(
+    scenes: tuple[Path, ...], prior: Path, times: int, seed: int, workers: int, poses: bool
+) -> None:
     """Print a table of streams."""
     opened = open_prior(prior)
     total = {(kind, track): Counter[str]() for track in (True, False) for kind in KINDS}
     for scene in (each for folder in scenes for each in find_scenes(folder)):
         for track in (True, False):
             with Reconstructor(opened, track=track, workers=workers, helpers=0) as session:
-                for kind, row in follow(session, scene, times, seed).items():
+                for kind, row in follow(session, scene, times, seed, poses).items():
                     total[kind, track] += row
         click.echo(scene.folder, err=True)
     columns = ("CPU s", "masks found", "ids kept", "ids of others", "recognised", "wrongly")

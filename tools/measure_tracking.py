@@ -4,13 +4,13 @@
     python tools/measure_tracking.py --seed 2 --frames 7 --moved-in 2 --round-from 4 --every
 
 Half of the objects are household shapes of the starter prior, the others are drawn at random and
-it lacks them. The camera stands at first and then goes round the table, its pose known or off by
-`--pose-error`; in one frame one object stands 8 cm elsewhere. Each frame has noise of a
-structured-light camera of its own and masks that are numbered from left to right. Printed after so
-many frames, each with and without sharpening: CPU seconds of the last frame, how many objects were
-inferred, how many ids have gone to another object so far, objects that were taken for what they
-are, the mean distance between the meshes' surfaces and the exact ones, both ways, and the mean
-uncertainty that was printed for them; of objects that the prior holds and of others apart.
+it lacks them. The camera stands at first and then goes round the table, its pose known, off by
+`--pose-error`, or not told; in one frame one object stands 8 cm elsewhere. Each frame has noise of
+a structured-light camera of its own and masks that are numbered from left to right. Printed after
+so many frames, each with and without sharpening: CPU seconds of the last frame, how many objects
+were inferred, how many ids have gone to another object so far, objects that were taken for what
+they are, the mean distance between the meshes' surfaces and the exact ones, both ways, and the
+mean uncertainty that was printed for them; of objects that the prior holds and of others apart.
 """
 
 from __future__ import annotations
@@ -63,12 +63,13 @@ class Shown:
 class Course:
     """step : radians by which the camera goes on from frame `round_from` on; in frame `moved_in`
     one object stands elsewhere; pose_error : metres, standard deviation of what each frame's pose
-    is off at the table, by its place and as much again by its direction"""
+    is off at the table, by its place and as much again by its direction; None = no frame tells it
+    """
 
     moved_in: int = MOVED_IN
     round_from: int = ROUND_FROM
     step: float = float(STEP)
-    pose_error: float = 0.0
+    pose_error: float | None = 0.0
 
 
 def shapes_of(seed: int, objects: int) -> list[Shape]:
@@ -130,8 +131,12 @@ def sequence(seed: int, frames: int, objects: int, course: Course | None = None)
         yield Shown(frame, {place: (i, meshes[i]) for place, i in enumerate(order, start=1)})
 
 
-def _told(T_world_cam: np.ndarray, error: float, rng: np.random.Generator) -> np.ndarray:
-    """A pose that is off by `error` metres at the table."""
+def _told(
+    T_world_cam: np.ndarray, error: float | None, rng: np.random.Generator
+) -> np.ndarray | None:
+    """A pose that is off by `error` metres at the table; None = nothing is told."""
+    if error is None:
+        return None
     from scipy.spatial.transform import Rotation
 
     turn, shift = rng.normal(size=(2, 3)) * error / np.sqrt(3)
@@ -196,6 +201,7 @@ def measure(session: object, shown: list[Shown], shapes: list[Shape], seed: int)
 @click.option("--round-from", type=click.IntRange(1), default=ROUND_FROM, show_default=True)
 @click.option("--step", type=float, default=float(np.rad2deg(STEP)), show_default=True)
 @click.option("--pose-error", type=float, default=0.0, show_default=True, help="Millimetres.")
+@click.option("--no-poses", is_flag=True, help="Frames do not tell them.")
 @click.option("--every", is_flag=True, help="Print every frame.")
 @click.option("--workers", type=click.IntRange(1), help="Objects at a time. [default: cores]")
 def main(
@@ -207,6 +213,7 @@ def main(
     round_from: int,
     step: float,
     pose_error: float,
+    no_poses: bool,
     every: bool,
     workers: int | None,
 ) -> None:
@@ -214,7 +221,9 @@ def main(
     from brrp_cli import Reconstructor, open_prior
     from brrp_cli.prior.build.starter import starter_prior
 
-    course = Course(moved_in, round_from, float(np.deg2rad(step)), pose_error / 1000)
+    course = Course(
+        moved_in, round_from, float(np.deg2rad(step)), None if no_poses else pose_error / 1000
+    )
     prior = open_prior(starter_prior())
     alone = replace(TrackConfig(), sharpen=None)
     total: Rows = defaultdict(lambda: defaultdict(list))

@@ -83,6 +83,22 @@ class GlideConfig:
 
 
 @dataclass(frozen=True)
+class OdometryConfig:
+    """How the motion of a camera that does not tell it is found.
+
+    reach : metres, what is farther off is not looked at
+    wrong : part of what an earlier frame saw at objects that may look otherwise by then, at most
+    turn, shift : radians and metres from which on another frame takes the place of the one that
+    later ones are held to
+    """
+
+    reach: float = 3.0
+    wrong: float = share(0.12)
+    turn: float = 0.1
+    shift: float = 0.1
+
+
+@dataclass(frozen=True)
 class TrackConfig:
     """Lengths are metres, in the camera frame of the newer image.
 
@@ -98,10 +114,11 @@ class TrackConfig:
     still_camera : metres and radians by which poses of one camera that stands may differ. Where no
     pose is given, a camera stands if both images share a share `ground` of background with depth,
     which has changed by `still` at most in the middle and `still_tail` times that in nine tenths of
-    it, and its colours by `still_colour`, of 255
+    it, its colours by `still_colour`, of 255, and edges lie within `still_edges` pixels
     lost : tracks that are remembered while their object is out of sight
     carry : when masks that were mended hold in the next frame
     glide : when masks and results hold before a camera that moves a little; None = never
+    odometry : how the camera's motion is found where frames do not tell it; None = it is not
     sharpen : how earlier views of an object join the newest one; None = they do not
     """
 
@@ -116,7 +133,9 @@ class TrackConfig:
     ground: float = share(0.2)
     still_tail: float = 5.0
     still_colour: float = 10.0
+    still_edges: float = 0.3
     lost: int = between(16, 0, 1000)
     carry: CarryConfig = field(default_factory=CarryConfig)
     glide: GlideConfig | None = field(default_factory=GlideConfig)
+    odometry: OdometryConfig | None = field(default_factory=OdometryConfig)
     sharpen: SharpenConfig | None = field(default_factory=SharpenConfig)

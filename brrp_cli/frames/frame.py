@@ -16,6 +16,18 @@ from brrp_cli.spoken import counted
 BACKGROUND = 0
 
 
+@dataclass(frozen=True)
+class StreamPose:
+    """Where a camera was that does not tell it, as a session that tracks found.
+
+    stream : number of a sequence of frames whose cameras are known to one another
+    T_stream_cam : (4, 4) rigid, to the frame of the first camera of these
+    """
+
+    stream: int
+    T_stream_cam: NDArray[np.float64]
+
+
 @dataclass(frozen=True, repr=False)
 class Frame:
     """What the camera saw and which pixel belongs to which object.
@@ -31,6 +43,7 @@ class Frame:
     aside : (H, W) int64, masks that were left out where brrp made those of `segmap`, 0 = none: what
         is recognised mends such masks. None where masks came with the frame
     corrected : ids of those of such masks that somebody corrected: they stay as they are
+    stream_pose : in a stream of frames without T_world_cam; None outside of one
 
     The arrays are read-only copies: nothing downstream can change what the caller handed in.
     """
@@ -43,6 +56,7 @@ class Frame:
     source: Path | None = field(default=None, compare=False)
     aside: NDArray[np.int64] | None = field(default=None, compare=False)
     corrected: frozenset[int] = field(default=frozenset(), compare=False)
+    stream_pose: StreamPose | None = field(default=None, compare=False)
 
     def __post_init__(self) -> None:
         height, width = self.segmap.shape

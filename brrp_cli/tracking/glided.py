@@ -39,7 +39,8 @@ class _Shown:
 
 
 def glided(then: Frame, now: Frame, plane: Plane | None, config: TrackConfig) -> Frame | None:
-    """This frame with the masks of an earlier one; None where they do not hold, or the camera stands.
+    """This frame with the masks of an earlier one; None where they do not hold, and before a camera
+    that stands.
 
     plane : what the objects of the earlier frame stand on, its camera frame; None = not known
     """

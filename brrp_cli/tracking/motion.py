@@ -1,6 +1,6 @@
 """How the camera has moved between two frames, which objects have not, and which are at rest.
 
-The camera's motion is known where both frames have T_world_cam or the background has not moved.
+The camera's motion is known where both frames have a pose or the background has not moved.
 """
 
 from __future__ import annotations
@@ -9,9 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brrp_cli.config.tracking import GlideConfig, SharpenConfig, TrackConfig
+from brrp_cli.dependencies import import_library
 from brrp_cli.frames.frame import BACKGROUND, Frame
 from brrp_cli.frames.projection import at_pixels, depth_behind
 from brrp_cli.geometry import inverse, normalise, transform_points
+
+# Of 255 in a pixel, from which on a slope of brightness is an edge; pixels of them that tell.
+EDGE, LEAST_EDGES = 12.0, 200
 
 
 def unmoved(before: Frame, frame: Frame, config: TrackConfig) -> frozenset[int]:
@@ -72,20 +76,50 @@ def camera_motion(last: Frame, frame: Frame, config: TrackConfig) -> NDArray[np.
     background has not moved; None where it has."""
     if last.T_world_cam is not None and frame.T_world_cam is not None:
         return np.asarray(np.linalg.inv(frame.T_world_cam) @ last.T_world_cam)
+    before, now = last.stream_pose, frame.stream_pose
+    if before is not None and now is not None and before.stream == now.stream:
+        return inverse(now.T_stream_cam) @ before.T_stream_cam
+    return np.eye(4) if background_stands(last, frame, config) else None
+
+
+def background_stands(last: Frame, frame: Frame, config: TrackConfig) -> bool:
+    """Whether two frames of one camera show the same background."""
     if last.shape != frame.shape or not np.allclose(last.K, frame.K):
-        return None
+        return False
     ground = (last.segmap == BACKGROUND) & (frame.segmap == BACKGROUND)
     both = ground & last.valid & frame.valid
     if both.sum() < config.ground * both.size:
-        return None
+        return False
     apart = np.abs(last.depth[both] - frame.depth[both]) / noisier(last.depth[both])
     # A camera that turns changes depth at every edge, one that slides along a table at few places.
     colour = np.abs(last.rgb[ground].astype(np.int16) - frame.rgb[ground]).mean()
-    same = (
+    return bool(
         np.median(apart) <= config.still
         and np.quantile(apart, 0.9) <= config.still_tail * config.still
+        and colour <= config.still_colour
+        and edge_motion(last, frame) <= config.still_edges
     )
-    return np.eye(4) if same and colour <= config.still_colour else None
+
+
+def edge_motion(last: Frame, frame: Frame) -> float:
+    """Pixels by which the edges of two images lie apart, the median of what each of the stronger
+    ones tells across itself (normal flow); 0 where there are too few."""
+    # Blurred, or a sharp edge would be seen on one side alone; channel by channel, since things of
+    # other colours can be as bright.
+    blur = import_library("scipy.ndimage").uniform_filter
+    before, now = (
+        np.stack([blur(each.rgb[..., i].astype(np.float32), 3) for i in range(3)])
+        for each in (last, frame)
+    )
+    slope = np.hypot(
+        before[:, 2:, 1:-1] - before[:, :-2, 1:-1], before[:, 1:-1, 2:] - before[:, 1:-1, :-2]
+    )
+    slope /= 2
+    changed = np.abs(now - before)[:, 1:-1, 1:-1]
+    strong = slope >= EDGE
+    if strong.sum() < LEAST_EDGES:
+        return 0.0
+    return float(np.median(changed[strong] / slope[strong]))
 
 
 def turned(points: NDArray[np.floating], T_now_then: NDArray[np.float64]) -> float:

@@ -26,6 +26,7 @@ from brrp_cli.tracking.glided import glided
 from brrp_cli.tracking.lost import Lost, lost_tracks
 from brrp_cli.tracking.motion import at_rest, camera_motion, spread_out, stands, unmoved
 from brrp_cli.tracking.moved import holds, moved_object
+from brrp_cli.tracking.odometry import Odometry
 from brrp_cli.tracking.renamed import new_names, with_names
 from brrp_cli.tracking.tried import tried_before
 from brrp_cli.tracking.unchanged import unchanged
@@ -72,6 +73,7 @@ class Tracker:
 
     def __init__(self, config: TrackConfig, least_part: float) -> None:
         self._config, self._least_part = config, least_part
+        self._odometry = Odometry(config)
         self._last: Followed | None = None
         # The frame that masks were made of last, with these, and its support plane.
         self._masked: tuple[Frame, Plane | None] | None = None
@@ -116,6 +118,10 @@ class Tracker:
         self._masked = None if made is None else (result.frame, result.plane)
         self._last = self._followed(result.frame, next_id, frozenset(mended), aside)
         return result
+
+    def posed(self, frame: Frame) -> Frame:
+        """The frame with its place in the stream: to be asked for first."""
+        return self._odometry(frame, None if self._last is None else self._last.frame)
 
     def again(self, frame: Frame, everything: Infer) -> Reconstruction | None:
         """All objects of a frame without masks, under those that were made last, where these hold;
