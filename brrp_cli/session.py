@@ -44,7 +44,7 @@ class Reconstructor:
 
     prior : opened, or the path of one; None with a method that has none
     config, weights, seed, device, workers : as in `reconstruct`
-    retriever : a name as `brrp reconstruct --retriever` takes it
+    retriever : a name as `brrp reconstruct --retriever` takes it, or one that was opened
     prompt : makes masks of what it names where a frame has none; None = of what stands on the
         table; segmentation : the numbers of both
     track : whether frames are those of one stream: an object keeps its id, and one that has not
@@ -64,7 +64,7 @@ class Reconstructor:
         method: str = DEFAULT,
         config: MethodConfig | None = None,
         weights: str | Path | None = None,
-        retriever: str = "auto",
+        retriever: str | Retriever | None = "auto",
         clip_dir: Path | None = None,
         prompt: str | None = None,
         masks_dir: Path | None = None,
@@ -85,11 +85,13 @@ class Reconstructor:
         self._prior = open_prior(Path(prior)) if isinstance(prior, (str, Path)) else prior
         self._retriever: Retriever | None = None
         if self._prior is not None and chosen.uses_retriever:
-            from brrp_cli.retrieval.choose import choose_retriever
+            if retriever is None or isinstance(retriever, str):
+                from brrp_cli.retrieval.choose import choose_retriever
 
-            self._retriever = choose_retriever(
-                retriever, self._prior, self._config, seed, clip_dir=clip_dir
-            )
+                retriever = choose_retriever(
+                    retriever or "auto", self._prior, self._config, seed, clip_dir=clip_dir
+                )
+            self._retriever = retriever
         self._segmentation = segmentation or SegmentConfig()
         self._tracker: Tracker | None = None
         if config_of_tracks is not None:

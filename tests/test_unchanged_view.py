@@ -20,7 +20,7 @@ TRACK = TrackConfig()
 
 def bare(*args, **kwargs):
     frame = scene(*args, **kwargs)
-    return frame.with_masks(np.zeros_like(frame.segmap))
+    return frame.without_masks()
 
 
 @pytest.fixture

@@ -66,7 +66,7 @@ def follow(
     ids: dict[int, int] = {}
     for view in range(len(scene.views)):
         shown = scene.view(view)
-        bare = shown.with_masks(np.zeros_like(shown.segmap))
+        bare = shown.without_masks()
         if not poses:
             bare = replace(bare, T_world_cam=None)
         for again in range(times):

@@ -26,6 +26,14 @@ def earlier_frames(
         return {}
 
 
+def was_tracked(output: Path) -> bool | None:
+    """Whether the last call was with --track; None where nobody can tell."""
+    try:
+        return "track" in parse_json((output / SUMMARY).read_text(encoding="utf-8"))["settings"]
+    except (OSError, ValueError, KeyError, TypeError):
+        return None
+
+
 def plain(settings: dict[str, Any]) -> dict[str, Any]:
     """As they are read back from JSON."""
     read: dict[str, Any] = json.loads(json.dumps(settings))

@@ -41,15 +41,23 @@ def make_masks(
 ) -> tuple[Frame, MadeMasks]:
     """The frame with masks made on the way; a picture of them is written beside the output."""
     from brrp_cli.frames.build import require_objects
-    from brrp_cli.segmentation.mask_picture import write_picture
 
     if source.masks is not None:
         return require_objects(frame), MadeMasks(config, None)
     picture = _picture(output)
     refuse_existing([picture], overwrite)
     frame = require_objects(source.make_masks(frame, seed, config))
+    tell_made(frame, source.prompt, output)
+    return frame.with_masks(frame.segmap), MadeMasks(config, frame.aside)
+
+
+def tell_made(frame: Frame, prompt: str | None, output: Path) -> None:
+    """Draw masks that were made on the way, and say so."""
+    from brrp_cli.segmentation.mask_picture import write_picture
+
+    picture = _picture(output)
     write_picture(frame, picture)
-    how = f"the prompt {source.prompt!r}" if source.prompt else "what stands on the table"
+    how = f"the prompt {prompt!r}" if prompt else "what stands on the table"
     note(
         f"Masks: made on the way from {how}, {counted(len(frame.object_ids), 'object')}: {picture}"
     )
@@ -57,7 +65,6 @@ def make_masks(
         f"  to correct them: brrp segment {quote(str(output / 'frame.npz'))} --merge 1,2 --split 3"
         " --drop 4 -o NEW.npz"
     )
-    return frame.with_masks(frame.segmap), MadeMasks(config, frame.aside)
 
 
 def masks_of(

@@ -18,6 +18,7 @@ from brrp_cli.commands.frames_summary import (
     earlier_frames,
     join_poses,
     plain,
+    was_tracked,
     write_summary,
 )
 from brrp_cli.errors import BrrpError, FrameError, OutputError, ResultError, unexpected
@@ -65,6 +66,7 @@ class Work:
     one : (frame, how, its folder) -> what is told of its objects, once all is written
     beside : what is written beside the results, also of frames that were there
     settings : what decides the result, as result.json holds it
+    track : whether the frames are those of a stream
     """
 
     source: SourceOptions
@@ -73,6 +75,7 @@ class Work:
     beside: Beside
     settings: dict[str, Any]
     overwrite: bool
+    track: bool = False
 
 
 def check_many(source: SourceOptions, output: Path, *, open_it: bool) -> None:
@@ -118,10 +121,16 @@ def run_many(work: Work, frames: slice, output: Path, report: dict[str, Any]) ->
         for name in chosen
         if not work.overwrite and (stored := _done(folders[name], work.settings)) is not None
     }
-    if done:
-        note(f"{len(done)} of {len(chosen)} frames were there and are left")
     source = str(work.source.path)
-    earlier = earlier_frames(output, source, work.settings)
+    settings = work.settings | ({"track": True} if work.track else {})
+    if done:
+        _check_track(output, track=work.track)
+        if work.track and len(done) < len(chosen):
+            note(f"{len(done)} of {len(chosen)} frames were there; a stream is done from its start")
+            done = {}
+        else:
+            note(f"{len(done)} of {len(chosen)} frames were there and are left")
+    earlier = earlier_frames(output, source, settings)
     told: list[dict[str, Any]] = [
         earlier.get(name, {}) | {"frame": name, "folder": folders[name].name, "status": SKIPPED}
         if name in done
@@ -132,7 +141,7 @@ def run_many(work: Work, frames: slice, output: Path, report: dict[str, Any]) ->
     # What earlier calls told of other frames of the source stays.
     here = {each["frame"]: each for each in told}
     summary = [here.get(name) or earlier[name] for name in every if name in here or name in earlier]
-    write_summary(output, source, work.settings, summary)
+    write_summary(output, source, settings, summary)
     failed = False
     with ExitStack() as stack:
         step = stack.enter_context(only_bar(len(told) - len(done), "frames"))
@@ -147,7 +156,7 @@ def run_many(work: Work, frames: slice, output: Path, report: dict[str, Any]) ->
             if first:  # what holds for every frame has been noted once
                 stack.enter_context(hushed())
                 first = False
-    write_summary(output, source, work.settings, summary)
+    write_summary(output, source, settings, summary)
     join_poses(output, summary, every)
     count = {status: sum(a["status"] == status for a in told) for status in (DONE, FAILED, SKIPPED)}
     say(
@@ -157,6 +166,20 @@ def run_many(work: Work, frames: slice, output: Path, report: dict[str, Any]) ->
         + f": {output}/ (FRAME/ as of one frame, {SUMMARY})"
     )
     return failed
+
+
+def _check_track(output: Path, *, track: bool) -> None:
+    """OutputError where the frames that are there were followed and are not to be, or the other
+    way round: their ids are others."""
+    before = was_tracked(output)
+    if before is not None and before != track:
+        raise OutputError(
+            "The frames were reconstructed "
+            + ("with" if before else "without")
+            + " --track before",
+            where=output,
+            fix="choose another folder with -o, or pass --overwrite to do all frames again",
+        )
 
 
 def _complete(work: Work, about: dict[str, Any], stored: StoredResult) -> bool:

@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import sys
 from dataclasses import asdict, replace
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from brrp_cli.commands.beside import POSES, Beside
+from brrp_cli.commands.do_frame import in_a_stream, on_its_own
 from brrp_cli.commands.export import CONFIDENCE, check_libraries
 from brrp_cli.commands.grasp import GRIPPER_HELP
 from brrp_cli.commands.json_option import json_option, report_of
-from brrp_cli.commands.made_masks import MadeMasks, make_masks, masks_of, tell_mended
+from brrp_cli.commands.made_masks import MadeMasks, make_masks, masks_of
 from brrp_cli.commands.many_frames import Work, check_many, frame_slice, run_many
 from brrp_cli.commands.method_options import (
     CONFIG_HELP,
@@ -41,13 +41,10 @@ from brrp_cli.retrieval.clip.model_files import CLIP_DIR_VARIABLE
 from brrp_cli.spoken import counted
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from brrp_cli.frames.frame import Frame
     from brrp_cli.grasping.gripper import Gripper
     from brrp_cli.methods.base import Method
     from brrp_cli.prior.store import Prior
-    from brrp_cli.reconstruction import Reconstruction
     from brrp_cli.retrieval.base import Retriever
 
 SOME_FAILED = 3
@@ -62,6 +59,12 @@ NO_COLLISION = "none"
     callback=frame_slice,
     help="Many frames of SOURCE: from A until before B, counted from 0; `:` is all. Each goes into"
     " OUT/FRAME/; those that are there are left.",
+)
+@click.option(
+    "--track",
+    is_flag=True,
+    help="With --frames: they are a stream. Objects keep their ids, and what is at rest is not done"
+    " again.",
 )
 @click.option("--prior", "prior_path", type=click.Path(path_type=Path), help="The prior to use.")
 @click.option(
@@ -145,6 +148,7 @@ NO_COLLISION = "none"
 def command(
     source: SourceOptions,
     frames: slice | None,
+    track: bool,
     prior_path: Path | None,
     output: Path | None,
     method: str,
@@ -189,19 +193,17 @@ def command(
       brrp reconstruct frame.npz --grasp --gripper robotiq-2f-85
       brrp reconstruct frame.npz --prior prior/ --poses bop
       brrp reconstruct recording.bag --frames 0:300:30 --prior prior/ -o out/
+      brrp reconstruct recording.bag --frames : --track --prior prior/ -o out/
     """
     source.check()
     check_weights([method], [] if weights is None else [weights])
 
-    from brrp_cli.api import open_result, reconstruct, try_masks
+    from brrp_cli.api import open_result
     from brrp_cli.config.segmentation import SegmentConfig
-    from brrp_cli.mending.again import Again
-    from brrp_cli.mending.mend import mend
     from brrp_cli.methods.config_file import read_config
     from brrp_cli.methods.configuration import as_record
     from brrp_cli.methods.shared_work import started_later
     from brrp_cli.results.write import check_output, write_results
-    from brrp_cli.retrieval.base import one_image
 
     check_collision(collision, confidence)
     hand = check_gripper(grasp_it, gripper)
@@ -212,6 +214,8 @@ def command(
     config = replace(config, k=k) if k else config
     output = output or source.name.with_name(f"{source.name.name}_{method}")
     # What can be refused is refused before the work, not after it.
+    if track and frames is None:
+        raise click.UsageError("--track is of many frames: add --frames")
     if frames is not None:
         check_many(source, output, open_it=open_it)
     else:
@@ -221,6 +225,8 @@ def command(
 
     def with_masks(frame: Frame, folder: Path) -> tuple[Frame, MadeMasks | None]:
         again = overwrite or frames is not None
+        if track:  # as what it is shown with, which the stream knows
+            return (frame.without_masks() if source.prompt else frame), None
         if source.prompt is None and frame.object_ids:
             if source.keep_all:
                 raise click.UsageError(
@@ -239,8 +245,6 @@ def command(
         own = chosen.own_weights
         used = weights or (own and f"{own.stem} (what comes with brrp)")
         note(f"Method: {method}, without a prior" + (f", weights {used}" if used else ""))
-    # Who asks for one frame has no use for them.
-    helpers = started_later(chosen, workers, 0 if frames is None else None)
     given: dict[str, Any] = {
         "prior": prior,
         "method": method,
@@ -250,11 +254,12 @@ def command(
         "seed": seed,
         "device": device,
         "workers": workers,
-        "helpers": helpers,
     }
-    run: Callable[..., Reconstruction] = partial(reconstruct, **given)
-    again = Again(run, partial(try_masks, **given))
-
+    if track:
+        do = in_a_stream(given, source, mask_config)
+    else:
+        # Who asks for one frame has no use for them.
+        do = on_its_own(given, started_later(chosen, workers, 0 if frames is None else None))
     beside = Beside(
         poses=poses is not None,
         names=[] if prior is None else prior.names,
@@ -267,17 +272,9 @@ def command(
 
     def one(frame: Frame, masks: MadeMasks | None, output: Path) -> list[Told]:
         """Reconstruct a frame, write it all, and say what was written."""
-        with one_image(retrieval):
-            result = run(frame)
-            if masks is not None:
-                result = mend(
-                    result, prior, again, masks.config, masks.aside, corrected=masks.corrected
-                )
-        helpers.start()
-        if masks is not None:
-            tell_mended(frame, result.frame, output)
-            result = replace(result, segmentation=asdict(masks.config))
-        write_results(result, output, frame=coordinates, overwrite=overwrite)
+        result = do(frame, masks, output)
+        # A stream is followed from its first frame, whatever of it was there.
+        write_results(result, output, frame=coordinates, overwrite=overwrite or track)
         table = told(result)
         done = len(result.reconstructed)
         for line in lines(table):
@@ -303,7 +300,7 @@ def command(
                 "config": as_record(config),
                 "segmentation": asdict(mask_config),
             }
-            work = Work(source, with_masks, one, beside, settings, overwrite=overwrite)
+            work = Work(source, with_masks, one, beside, settings, overwrite, track)
             failed = run_many(work, frames, output, report)
         else:
             table = one(seen, masks, output)

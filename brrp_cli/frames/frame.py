@@ -144,6 +144,10 @@ class Frame:
         vars(frame).pop("object_ids", None)
         return frame
 
+    def without_masks(self) -> Frame:
+        """The same image, all of it background."""
+        return self.with_masks(np.zeros(self.shape, np.int64))
+
     def with_points(self, points: NDArray[np.float32]) -> Frame:
         """The same image with other points (H, W, 3), metres, camera frame, at the same pixels.
         Unlike `dataclasses.replace` it copies nothing, and makes the points read-only."""

@@ -10,7 +10,6 @@ from dataclasses import replace
 from types import SimpleNamespace
 
 import for_helpers
-import numpy as np
 import pytest
 from for_helpers import Common
 from table_scene import box, in_camera, photograph, placed
@@ -125,7 +124,7 @@ def test_only_a_method_that_gains_by_it_has_helpers(method, workers, count):
 
 
 def test_a_session_with_helpers_has_the_bytes_of_one_without(prior, frame):
-    bare = frame.with_masks(np.zeros_like(frame.segmap))
+    bare = frame.without_masks()
     with (
         Reconstructor(prior, workers=1) as alone,
         Reconstructor(prior, workers=2) as session,
