@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -17,6 +19,8 @@ from brrp_cli.geometry import inverse, transform_points
 from brrp_cli.tracking.motion import background_stands, noisier
 
 Array = NDArray[np.float64]
+# Small images lead far, and astray where there is little to see: at first without them.
+STEPS = ((8, 6), (20, 10, 5))
 
 
 class Odometry:
@@ -50,8 +54,9 @@ class Odometry:
             return replace_pose(frame, self._at.stream_pose)
         if self._key is None or self._key.stream_pose is None or _far(self._key, last, own):
             self._key = last
-        for key, guess in ((self._key, self._step @ _between(self._key, last)), (last, np.eye(4))):
-            T_now_key = motion(key, frame, guess, own)
+        held_to = ((self._key, self._step @ _between(self._key, last)), (last, np.eye(4)))
+        for steps, (key, guess) in product(STEPS, held_to):
+            T_now_key = motion(key, frame, guess, steps, own)
             if T_now_key is None or _wrong(key, frame, T_now_key, self._config) > own.wrong:
                 continue
             assert key.stream_pose is not None
@@ -78,10 +83,16 @@ def replace_pose(frame: Frame, pose: StreamPose | None) -> Frame:
     return moved
 
 
-def motion(then: Frame, now: Frame, guess: Array, config: OdometryConfig) -> Array | None:
+def motion(
+    then: Frame, now: Frame, guess: Array, steps: Sequence[int], config: OdometryConfig
+) -> Array | None:
     """T_now_then (4, 4) of two images of one camera of things at rest, by Open3D (colour and depth
-    together, Park et al., ICCV 2017); None where it finds none."""
-    odometry = import_open3d().pipelines.odometry
+    together, Park et al., ICCV 2017); None where it finds none.
+
+    steps : as many images, each of half the size, from the smallest on, with so many steps
+    """
+    o3d = import_open3d()
+    odometry = o3d.pipelines.odometry
     # Sums of several threads change their last bits from run to run.
     with one_openmp_thread():
         found, T_now_then, _ = odometry.compute_rgbd_odometry(
@@ -90,7 +101,7 @@ def motion(then: Frame, now: Frame, guess: Array, config: OdometryConfig) -> Arr
             _intrinsics(now),
             guess,
             odometry.RGBDOdometryJacobianFromHybridTerm(),
-            odometry.OdometryOption(),
+            odometry.OdometryOption(o3d.utility.IntVector(steps)),
         )
     return np.array(T_now_then) if found and np.isfinite(T_now_then).all() else None
 
