@@ -48,8 +48,8 @@ class Reconstructor:
     prompt : makes masks of what it names where a frame has none; None = of what stands on the
         table; segmentation : the numbers of both
     track : whether frames are those of one stream: an object keeps its id, and one that has not
-        moved before a camera that stands keeps its result, and what earlier frames showed of one
-        at rest joins what the newest shows; or the numbers of that
+        moved its result, before a camera that stands or moves a little, and what earlier frames
+        showed of one at rest joins what the newest shows; or the numbers of that
     helpers : processes beside this one that do some of the objects from the second frame on; None =
         one less than there are workers, 3 at most. Results do not depend on them
 

@@ -120,8 +120,9 @@ def test_masks_go_along(made):
         {RED: A, BLUE: START[BLUE]},
         {RED: A, (220, 210, 60): START[GREEN], BLUE: START[BLUE]},
         START | {GREEN: (0.12, 0.13)},
+        START | {GREEN: (0.108, 0.013)},
     ],
-    ids=["has come", "has gone", "another in its place", "has moved"],
+    ids=["has come", "has gone", "another in its place", "has moved", "has slid"],
 )
 def test_masks_are_made_where_something_else_is_seen(now, made):
     with Reconstructor(method="sphere", track=True) as session:

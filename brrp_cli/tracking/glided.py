@@ -27,14 +27,15 @@ class _Shown:
     """What an earlier frame showed of each pixel (H, W) of this one.
 
     same : the same surface; labels : its masks there
-    outside : nothing, as its image did not reach there; changed : what was not there, or has
-    another colour; hidden : nothing, as something was in front
+    outside : nothing, as its image did not reach there; come : what is farther off than this;
+    recoloured : the same surface in another colour; hidden : nothing, as something was in front
     """
 
     same: Mask
     labels: NDArray[np.int64]
     outside: Mask
-    changed: Mask
+    come: Mask
+    recoloured: Mask
     hidden: Mask
 
 
@@ -55,11 +56,16 @@ def glided(then: Frame, now: Frame, plane: Plane | None, config: TrackConfig) ->
     shown = _shown(then, now, inverse(T_now_then), config)
     if shown.outside.sum() > own.outside * now.valid.sum():
         return None
-    for come in (shown.changed, shown.hidden & _rising(now, plane, T_now_then, own)):
-        if come.any() and opened(come, config.carry.opening).sum() >= config.carry.least_pixels:
+    # Seen flatly, a table is as level as ever where its depth wavers by centimetres.
+    rising = _rising(now, plane, T_now_then, own)
+    changed = shown.come & rising | shown.recoloured
+    for other in (changed, shown.hidden & rising):
+        if other.any() and opened(other, config.carry.opening).sum() >= config.carry.least_pixels:
             return None
     segmap = _filled(shown, now, config)
-    if any(slides(segmap == i, shown.changed, config) for i in np.unique(segmap) if i):
+    # Bled depth goes with the side: as a line at most.
+    wide = opened(changed, 1)
+    if any(slides(segmap == i, wide, config) for i in np.unique(segmap) if i):
         return None
     return now.with_masks(segmap)
 
@@ -71,16 +77,17 @@ def _shown(then: Frame, now: Frame, T_then_now: NDArray[np.float64], config: Tra
     gap = _whole(then).ravel()[pixel] - points[:, 2]
     near = config.carry.gap * noisier(points[:, 2])
     colour = np.abs(then.rgb.reshape(-1, 3)[pixel].astype(np.int16) - now.rgb.reshape(-1, 3))
-    measured = inside & now.valid.ravel() & then.valid.ravel()[pixel]
+    measured = inside & now.valid.ravel()
     same = inside & (np.abs(gap) <= near)
-    other = measured & same & (colour.mean(axis=-1) > config.colour)
+    both = measured & then.valid.ravel()[pixel] & same
     labels = np.where(same, then.segmap.ravel()[pixel], BACKGROUND)
     shape = now.shape
     return _Shown(
         same.reshape(shape),
         labels.reshape(shape).astype(np.int64),
         outside=~inside.reshape(shape) & now.valid,
-        changed=(measured & (gap > near) | other).reshape(shape),
+        come=(measured & (gap > near)).reshape(shape),
+        recoloured=(both & (colour.mean(axis=-1) > config.colour)).reshape(shape),
         hidden=(measured & (gap < -near)).reshape(shape),
     )
 
