@@ -4,11 +4,13 @@
 
 Each made scene (published layout, `tools/make_scenes.py --views 4`) is one stream: all its views,
 each `--times` times, with white noise of 1 mm at 1 m that grows with the square of depth from the
-second time on. Masks are made from depth. With `--no-poses` no frame tells where its camera was.
-Printed for first views, for views that are seen again and for other views, each with a session
-that tracks and with one that does not: CPU seconds a frame; true objects whose mask is found (IoU
-over 0.7); of those that were found before, how many have their id, and how many have another
-object's; how many are recognised as what they are, and as what they are not.
+second time on. Masks are made from depth. With `--no-poses` no frame tells where its camera was,
+and only the session that tracks is measured. Printed for first views, for views that are seen
+again and for other views, each with a session that tracks and with one that does not: CPU seconds
+a frame; true objects whose mask is found (IoU over 0.7); of those that were found before, how many
+have their id, and how many have another object's; how many are recognised as what they are, and as
+what they are not. With `--data-root` also how far meshes and exact meshes are apart on average,
+both ways.
 """
 
 from __future__ import annotations
@@ -17,6 +19,7 @@ import sys
 import time
 from collections import Counter
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -32,11 +35,14 @@ from brrp_cli import Reconstructor, open_prior
 from brrp_cli.errors import FrameError
 from brrp_cli.frames.frame import Frame
 from brrp_cli.ground_truth.scenes import Scene, find_scenes
+from brrp_cli.ground_truth.surface_metrics import MeshSurface
+from brrp_cli.ground_truth.truth import true_mesh
 from brrp_cli.seeds import child_rng
 
 KINDS = ("first view", "the same view again", "another view")
 LEAST, FOUND = 300, 0.7  # pixels of a true object; IoU
 NOISE = 0.001
+POINTS = 2_000  # on each of two surfaces that are compared
 
 
 def noisy(frame: Frame, rng: np.random.Generator) -> Frame:
@@ -58,10 +64,26 @@ def fits(true: np.ndarray, found: np.ndarray) -> dict[int, int]:
     }
 
 
+def apart(one: MeshSurface, other: MeshSurface, rng: np.random.Generator) -> float:
+    """Metres, the mean distance of points of either mesh to the other's triangles."""
+    way = [b.nearest(a.sample(POINTS, rng)[0]).distance for a, b in ((one, other), (other, one))]
+    return float(np.mean(way))
+
+
 def follow(
-    session: Any, scene: Scene, times: int, seed: int, poses: bool = True
+    session: Any,
+    scene: Scene,
+    times: int,
+    seed: int,
+    *,
+    poses: bool = True,
+    data_root: Path | None = None,
 ) -> dict[str, Counter[str]]:
-    """What became of one scene's objects, by kind of frame."""
+    """What became of one scene's objects, by kind of frame.
+
+    poses : whether frames tell them; data_root : of the true meshes; None = they are not measured
+    """
+    true_surface = cache(lambda i: MeshSurface(true_mesh(scene.object(i), data_root)))
     told: dict[str, Counter[str]] = {kind: Counter() for kind in KINDS}
     ids: dict[int, int] = {}
     for view in range(len(scene.views)):
@@ -81,7 +103,7 @@ def follow(
                 click.echo(f"{scene.name}, view {view}: {error.what}", err=True)
                 continue
             row["cpu"] += time.process_time() - spent
-            outcome = {item.object_id: item.recognised for item in result.objects}
+            outcome = {item.object_id: item for item in result.objects}
             for true, mask in fits(shown.segmap, result.frame.segmap).items():
                 row["found"] += 1
                 if true in ids:
@@ -89,9 +111,15 @@ def follow(
                     row["kept"] += ids[true] == mask
                 row["swapped"] += any(i == mask and other != true for other, i in ids.items())
                 ids[true] = mask
-                name = outcome[mask].name if outcome[mask] is not None else None
+                recognised = outcome[mask].recognised
+                name = None if recognised is None else recognised.name
                 row["right"] += name == scene.object(true).name
                 row["wrong"] += name not in (None, scene.object(true).name)
+                if data_root is not None and outcome[mask].surface is not None:
+                    mesh = outcome[mask].surface.as_trimesh().apply_transform(shown.T_world_cam)
+                    rng = child_rng(seed, "surface", scene.name, view, true)
+                    row["mm"] += 1000 * apart(MeshSurface(mesh), true_surface(true), rng)
+                    row["measured"] += 1
     return told
 
 
@@ -102,19 +130,29 @@ def follow(
 @click.option("--seed", type=click.IntRange(0), default=0, show_default=True)
 @click.option("--workers", type=click.IntRange(1), default=1, show_default=True)
 @click.option("--poses/--no-poses", default=True, show_default=True, help="Of the cameras.")
+@click.option("--data-root", type=click.Path(path_type=Path), help="Of the true meshes.")
 def main(
-    scenes: tuple[Path, ...], prior: Path, times: int, seed: int, workers: int, poses: bool
+    scenes: tuple[Path, ...],
+    prior: Path,
+    times: int,
+    seed: int,
+    workers: int,
+    poses: bool,
+    data_root: Path | None,
 ) -> None:
     """Print a table of streams."""
     opened = open_prior(prior)
     total = {(kind, track): Counter[str]() for track in (True, False) for kind in KINDS}
     for scene in (each for folder in scenes for each in find_scenes(folder)):
-        for track in (True, False):
+        # Who remembers nothing has no use for poses.
+        for track in (True, False) if poses else (True,):
             with Reconstructor(opened, track=track, workers=workers, helpers=0) as session:
-                for kind, row in follow(session, scene, times, seed, poses).items():
+                told = follow(session, scene, times, seed, poses=poses, data_root=data_root)
+                for kind, row in told.items():
                     total[kind, track] += row
         click.echo(scene.folder, err=True)
-    columns = ("CPU s", "masks found", "ids kept", "ids of others", "recognised", "wrongly")
+    columns = ["CPU s", "masks found", "ids kept", "ids of others", "recognised", "wrongly"]
+    columns += [] if data_root is None else ["mm"]
     print("| frames | tracks | " + " | ".join(columns) + " |")
     print("| --- " * (len(columns) + 2) + "|")
     for (kind, track), row in total.items():
@@ -123,6 +161,8 @@ def main(
         cells = [f"{row['cpu'] / row['frames']:.1f}", f"{row['found']} of {row['true']}"]
         cells += [f"{row['kept']} of {row['before']}", str(row["swapped"])] if track else ["-", "-"]
         cells += [str(row["right"]), str(row["wrong"])]
+        if data_root is not None:
+            cells.append(f"{row['mm'] / max(row['measured'], 1):.2f}")
         print(f"| {kind} | {'yes' if track else 'no'} | " + " | ".join(cells) + " |", flush=True)
 
 

@@ -6,8 +6,10 @@
         -r depth:=/camera/aligned_depth_to_color/image_raw \
         -r camera_info:=/camera/color/camera_info
 
-Prior, retrieval and the models of the prompt are loaded once. A frame takes seconds: while one is
-at work, newer ones are dropped but for the last. Topic `objects`: visualization_msgs/MarkerArray,
+Prior, retrieval and the models of the prompt are loaded once. The frames are one stream: objects
+keep their ids, and what is at rest is not done again (`-p track:=false` takes each frame for
+itself). A frame in which something is new takes seconds: while one is at work, newer ones are
+dropped but for the last. Topic `objects`: visualization_msgs/MarkerArray,
 triangles in the objects' colours, metres, in the frame of the colour image's header. Without a
 prompt, masks are made of what stands on the table.
 
@@ -37,7 +39,8 @@ def run_node() -> None:
     rclpy.init(args=sys.argv)
     node = rclpy.create_node("brrp")
     given = {name: node.declare_parameter(name, "").value for name in ("prior", "prompt")}
-    session = Reconstructor(given["prior"] or None, prompt=given["prompt"] or None)
+    track = bool(node.declare_parameter("track", True).value)
+    session = Reconstructor(given["prior"] or None, prompt=given["prompt"] or None, track=track)
     output = node.create_publisher(MarkerArray, "objects", 1)
 
     def publish(objects: list[SeenObject], messages: tuple[Any, ...]) -> None:

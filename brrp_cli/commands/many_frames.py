@@ -173,10 +173,9 @@ def _check_track(output: Path, *, track: bool) -> None:
     way round: their ids are others."""
     before = was_tracked(output)
     if before is not None and before != track:
+        how = "with" if before else "without"
         raise OutputError(
-            "The frames were reconstructed "
-            + ("with" if before else "without")
-            + " --track before",
+            f"The frames were reconstructed {how} --track before",
             where=output,
             fix="choose another folder with -o, or pass --overwrite to do all frames again",
         )

@@ -225,7 +225,7 @@ def command(
 
     def with_masks(frame: Frame, folder: Path) -> tuple[Frame, MadeMasks | None]:
         again = overwrite or frames is not None
-        if track:  # as what it is shown with, which the stream knows
+        if track:  # the stream makes masks, and mends those that brrp made before
             return (frame.without_masks() if source.prompt else frame), None
         if source.prompt is None and frame.object_ids:
             if source.keep_all:
