@@ -110,7 +110,7 @@ def test_ids_stay_while_the_camera_goes_round(known, inferred):
     """Masks are numbered from left to right: going round, their order changes."""
     session = Reconstructor(method="sphere", track=True)
     by_colour, orders = [], set()
-    for yaw in np.arange(0.4, 2.5, 0.15):
+    for yaw in np.arange(0.4, 2.5, 0.2):
         seen = scene(START, yaw=yaw, known=known)
         orders.add(tuple(colour_of(seen, i) for i in seen.object_ids))
         result = session(seen)
