@@ -6,6 +6,7 @@ is x right, y down, z forward (ROS optical frame); pixel (u, v) is column u, row
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import TypeVar
 
 import numpy as np
@@ -30,9 +31,14 @@ def inverse(T_target_source: NDArray[np.floating]) -> NDArray[np.float64]:
     return np.asarray(np.linalg.inv(T_target_source), dtype=np.float64)
 
 
+def grid_nodes(axes: Iterable[NDArray[Number]]) -> NDArray[Number]:
+    """Nodes (n1, ..., nd, d) of a grid with the coordinates (n1,), ..., (nd,) along each axis."""
+    return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
+
+
 def moved_box(T_target_source: Array, box: NDArray[np.float64]) -> NDArray[np.float64]:
     """The box (2, 3) along the target frame's axes around a box (2, 3) of the source frame."""
-    corners = np.stack(np.meshgrid(*box.T, indexing="ij"), axis=-1).reshape(-1, 3)
+    corners = grid_nodes(box.T).reshape(-1, 3)
     return np.stack(bounds(transform_points(T_target_source, corners)))
 
 

@@ -29,6 +29,7 @@ import numpy as np
 # The script also runs from a checkout that is not installed.
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
+from measure_tracking import apart
 from score_masks import overlaps
 
 from brrp_cli import Reconstructor, open_prior
@@ -62,12 +63,6 @@ def fits(true: np.ndarray, found: np.ndarray) -> dict[int, int]:
         for i, row, size in zip(ids, iou, sizes, strict=True)
         if len(masks) and size >= LEAST and row.max() > FOUND
     }
-
-
-def apart(one: MeshSurface, other: MeshSurface, rng: np.random.Generator) -> float:
-    """Metres, the mean distance of points of either mesh to the other's triangles."""
-    way = [b.nearest(a.sample(POINTS, rng)[0]).distance for a, b in ((one, other), (other, one))]
-    return float(np.mean(way))
 
 
 def follow(
@@ -118,7 +113,7 @@ def follow(
                 if data_root is not None and outcome[mask].surface is not None:
                     mesh = outcome[mask].surface.as_trimesh().apply_transform(shown.T_world_cam)
                     rng = child_rng(seed, "surface", scene.name, view, true)
-                    row["mm"] += 1000 * apart(MeshSurface(mesh), true_surface(true), rng)
+                    row["mm"] += 1000 * apart(MeshSurface(mesh), true_surface(true), POINTS, rng)
                     row["measured"] += 1
     return told
 

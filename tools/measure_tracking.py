@@ -154,11 +154,14 @@ def true_objects(shown: Shown, segmap: np.ndarray) -> dict[int, int]:
 
 def surface_distance(mesh: object, truth: object, seed: int) -> float:
     """Metres, the mean distance of points of either mesh to the other's triangles."""
-    made, true = MeshSurface(mesh), MeshSurface(truth)
     rng = child_rng(seed, "surface")
-    there, _ = made.sample(POINTS, rng)
-    back, _ = true.sample(POINTS, rng)
-    return float((true.nearest(there).distance.mean() + made.nearest(back).distance.mean()) / 2)
+    return apart(MeshSurface(mesh), MeshSurface(truth), POINTS, rng)
+
+
+def apart(one: MeshSurface, other: MeshSurface, points: int, rng: np.random.Generator) -> float:
+    """Metres, the mean distance of `points` points of either mesh to the other's triangles."""
+    ways = [b.nearest(a.sample(points, rng)[0]).distance for a, b in ((one, other), (other, one))]
+    return float(np.mean(ways))
 
 
 Rows = dict[tuple[bool, int], dict[str, list[float]]]

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import map_coordinates
 
-from brrp_cli.geometry import inverse, moved_box, transform_points
+from brrp_cli.geometry import grid_nodes, inverse, moved_box, transform_points
 from brrp_cli.hdf5 import stored_motion, write_compressed
 from brrp_cli.reconstruction import Axes
 
@@ -63,7 +63,7 @@ class MeanGrid:
         """m (nx, ny, nz) on a grid along the camera's axes, metres: `logits` one axis after the
         other, a tenth of the steps, where these are the grid's axes, too."""
         if self.T_cam_grid is not None:
-            nodes = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
+            nodes = grid_nodes(axes)
             return self.logits(nodes.reshape(-1, 3)).reshape(nodes.shape[:3])
         values = self.values.astype(np.float32)
         within = []
@@ -107,4 +107,4 @@ def grid_over(box: Array, nodes: int) -> tuple[Array, float, Array]:
     spacing = float((np.prod(box[1] - box[0]) / nodes) ** (1 / 3))
     shape = np.ceil((box[1] - box[0]) / spacing).astype(np.int64) + 1
     axes = [low + spacing * np.arange(n) for low, n in zip(box[0], shape, strict=True)]
-    return box[0].copy(), spacing, np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
+    return box[0].copy(), spacing, grid_nodes(axes)

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from brrp_cli.geometry import transform_points
+from brrp_cli.geometry import grid_nodes, transform_points
 from brrp_cli.hdf5 import write_compressed
 from brrp_cli.prior.distance_field import DistanceField
 from brrp_cli.prior.shape import StoredShape
@@ -123,7 +123,7 @@ class PlacedShape:
 
     def volume(self, axes: Axes) -> NDArray[np.float32]:
         """m (nx, ny, nz) on a grid of camera-frame coordinates, metres."""
-        nodes = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
+        nodes = grid_nodes(axes)
         return self.logits(nodes.reshape(-1, 3)).reshape(nodes.shape[:3])
 
     def write(self, group: h5py.Group, shared: SharedParts) -> None:

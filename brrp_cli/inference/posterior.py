@@ -9,7 +9,7 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from brrp_cli.geometry import inverse, moved_box, transform_points
+from brrp_cli.geometry import grid_nodes, inverse, moved_box, transform_points
 from brrp_cli.hdf5 import stored_motion
 from brrp_cli.inference.hinge import HingeGrid, factors, grid_logits
 from brrp_cli.reconstruction import LOGIT_VARIANCE, Axes
@@ -90,7 +90,7 @@ class HilbertPosterior:
     def logit_volume(self, axes: Axes) -> NDArray[np.float32]:
         """w . phi (P, nx, ny, nz) on a grid of camera-frame coordinates, metres."""
         if self.T_cam_map is not None:
-            nodes = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
+            nodes = grid_nodes(axes)
             return self.logits(nodes.reshape(-1, 3)).reshape(-1, *nodes.shape[:3])
         local = tuple(
             torch.from_numpy((np.asarray(axis, np.float64) - middle).astype(np.float32))

@@ -72,10 +72,10 @@ def spread_out(directions: NDArray[np.float64], count: int) -> list[int]:
 
 
 def camera_motion(last: Frame, frame: Frame, config: TrackConfig) -> NDArray[np.float64] | None:
-    """T_now_last (4, 4) between the two camera frames; the identity where nobody tells and the
-    background has not moved; None where it has."""
+    """T_now_last (4, 4) between the two camera frames, as both tell or as was found; else the
+    identity where the background has not moved, and None where it has."""
     if last.T_world_cam is not None and frame.T_world_cam is not None:
-        return np.asarray(np.linalg.inv(frame.T_world_cam) @ last.T_world_cam)
+        return inverse(frame.T_world_cam) @ last.T_world_cam
     before, now = last.stream_pose, frame.stream_pose
     if before is not None and now is not None and before.stream == now.stream:
         return inverse(now.T_stream_cam) @ before.T_stream_cam

@@ -6,11 +6,10 @@ import json
 from pathlib import Path
 
 import pytest
-from click.testing import CliRunner, Result
 from sphere_method import METHOD
+from test_many_frames import run
 from test_tracking import BLUE, GREEN, RED, START, YAW, colour_of, scene
 
-from brrp_cli.cli import main
 from brrp_cli.frames.npz import load_frame, save_frame
 from brrp_cli.methods.registry import METHODS
 
@@ -25,15 +24,6 @@ def source(tmp_path, monkeypatch) -> Path:
     for number, yaw in enumerate(YAWS):
         save_frame(scene(START, yaw=yaw, known=True), folder / f"f{number}.npz")
     return folder
-
-
-def run(source: Path, *arguments: object) -> Result:
-    result = CliRunner().invoke(
-        main, ["reconstruct", str(source), "--method", "sphere", *map(str, arguments)]
-    )
-    if result.exception is not None and not isinstance(result.exception, SystemExit):
-        raise result.exception
-    return result
 
 
 def colours(out: Path) -> list[dict[int, tuple[int, ...]]]:
