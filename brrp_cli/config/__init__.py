@@ -19,6 +19,7 @@ from brrp_cli.config.inference import (
     MeanConfig,
     RampConfig,
     RevolutionConfig,
+    StandingConfig,
     VolumeConfig,
 )
 from brrp_cli.config.kin import KinConfig
@@ -62,6 +63,7 @@ __all__ = [
     "RevolutionConfig",
     "SearchConfig",
     "SensorConfig",
+    "StandingConfig",
     "StrayConfig",
     "SurfaceConfig",
     "TurnConfig",

@@ -111,6 +111,26 @@ class RevolutionConfig:
 
 
 @dataclass(frozen=True)
+class StandingConfig:
+    """Objects whose feet are hidden (brrp_cli/completion/standing.py).
+
+    sure : how probable the most probable place of each height is at least
+    least : probability that the object reaches down to the plane, as the network has it, under
+        which it stands on something else
+    foot : metres, height of the lowest of what is seen; gap : metres between neighbouring pixels of
+        it and of another object that touches it; touched : share of its border that touches
+        others, from which on it may stand on them
+    """
+
+    enabled: bool = True
+    sure: float = share(0.8)
+    least: float = share(0.2)
+    foot: float = 0.02
+    gap: float = 0.015
+    touched: float = share(0.3)
+
+
+@dataclass(frozen=True)
 class MeanConfig:
     """Prior mean functions of hypotheses, as logits.
 
@@ -137,6 +157,7 @@ class MeanConfig:
     shell_logit: float = 2.0
     ramp: RampConfig = field(default_factory=RampConfig)
     revolution: RevolutionConfig = field(default_factory=RevolutionConfig)
+    standing: StandingConfig = field(default_factory=StandingConfig)
     carve_depth: float = 0.006
     carve_plane: float = 0.004
     carve_behind: float = 0.01

@@ -18,6 +18,7 @@ from brrp_cli.completion.revolution import round_logits
 from brrp_cli.completion.revolution_axis import Axis
 from brrp_cli.completion.roundness import axis_of
 from brrp_cli.completion.seen_surface import SeenSurface, joined
+from brrp_cli.completion.standing import on_others, standing
 from brrp_cli.completion.visible_part import VisiblePart, visible_part
 from brrp_cli.config import HypothesesConfig, MeanConfig
 from brrp_cli.frames.frame import Frame
@@ -166,6 +167,10 @@ def _completed(
     every[~empty] = views.averaged(alone[~empty], left)
     if axis is not None:
         every = round_logits(axis, nodes, empty, every, part, shell, config)
+    if plane is not None and config.standing.enabled and not on_others(part, config.standing):
+        thought = np.clip(every[~empty], -config.limit, config.limit)
+        heights = plane.signed_distance(left)
+        every[~empty] = standing(thought, heights, spacing, config.standing)
     logits = within(every, empty, joined(bounds), config)
     guess = Guess(lower, spacing, np.where(empty, np.nan, alone).astype(np.float16))
     return MeanGrid(lower, spacing, logits, outside=-config.limit), guess
