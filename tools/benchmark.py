@@ -35,6 +35,7 @@ import click
 # The script also runs from a checkout that is not installed.
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
+from one_message import one_message
 from plain.reconstruct import STAGES, reconstruct_plainly
 from speed.denormals import by_folder, watch_denormals
 from speed.frames import four_objects, with_objects
@@ -44,7 +45,6 @@ from speed.measure import cold_reconstruct, own_megabytes, peak_megabytes, run, 
 from speed.sets import HEAD, frames_of, measure_set
 
 from brrp_cli.config import preset
-from brrp_cli.errors import BrrpError
 from brrp_cli.frames.frame import Frame
 from brrp_cli.frames.npz import save_frame
 from brrp_cli.frames.readers import read_frame
@@ -85,6 +85,7 @@ class Options:
 @click.option("--make-masks", is_flag=True, help="Those of sets, anew.")
 @click.option("--quick", is_flag=True, help="One repeat, one plain object, less growth.")
 @click.option("--json", "history", type=click.Path(path_type=Path), help="Append a line here.")
+@one_message()
 def main(
     frame_paths: tuple[Path, ...],
     prior_path: Path | None,
@@ -104,31 +105,28 @@ def main(
     if quick:
         repeats, plain_objects = 1, 1 if plain_objects is None else plain_objects
     options = Options(repeats, workers or cores(), plain_objects, cold)
-    try:
-        frames = {MADE: four_objects()} if made else {}
-        frames |= {str(path): read_frame(path) for path in frame_paths}
-        if not frames and not sets:
-            raise click.UsageError("name a frame or a set, or leave out --no-made")
-        prior = open_prior(_starter() if prior_path is None else prior_path)
-        machine = measure_machine()
-        click.echo(
-            f"{machine.processor}, {machine.cores} cores; one core: {machine.flops / 1e9:.0f} "
-            f"GFLOP/s, {machine.bandwidth / 1e9:.1f} GB/s"
-        )
-        record: dict[str, Any] = {
-            "time": time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime()),
-            "version": __version__,
-            "machine": asdict(machine),
-            "stored_objects": len(prior.names),
-            "workers": options.workers,
-            "frames": [measure(n, f, prior, machine, options) for n, f in frames.items()],
-        }
-        if sets:
-            record["sets"] = measure_sets(sets, set_frames, make_masks, prior, options)
-        if growth and frames:
-            record["growth"] = measure_growth(next(iter(frames.values())), prior, options, quick)
-    except BrrpError as error:
-        raise click.ClickException(str(error)) from error
+    frames = {MADE: four_objects()} if made else {}
+    frames |= {str(path): read_frame(path) for path in frame_paths}
+    if not frames and not sets:
+        raise click.UsageError("name a frame or a set, or leave out --no-made")
+    prior = open_prior(_starter() if prior_path is None else prior_path)
+    machine = measure_machine()
+    click.echo(
+        f"{machine.processor}, {machine.cores} cores; one core: {machine.flops / 1e9:.0f} "
+        f"GFLOP/s, {machine.bandwidth / 1e9:.1f} GB/s"
+    )
+    record: dict[str, Any] = {
+        "time": time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime()),
+        "version": __version__,
+        "machine": asdict(machine),
+        "stored_objects": len(prior.names),
+        "workers": options.workers,
+        "frames": [measure(n, f, prior, machine, options) for n, f in frames.items()],
+    }
+    if sets:
+        record["sets"] = measure_sets(sets, set_frames, make_masks, prior, options)
+    if growth and frames:
+        record["growth"] = measure_growth(next(iter(frames.values())), prior, options, quick)
     record["peak_megabytes"] = round(peak_megabytes(), 1)
     if history is not None:
         with history.open("a") as stream:

@@ -21,9 +21,9 @@ import click
 # The script also runs from a checkout that is not installed.
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
+from one_message import one_message
 from speed.measure import cold, run, spread
 
-from brrp_cli.errors import BrrpError
 from brrp_cli.prior.build.find_meshes import MeshSource, find_meshes
 from brrp_cli.prior.build.make_object import make_object
 from brrp_cli.prior.parameters import BuildParameters
@@ -35,15 +35,13 @@ from brrp_cli.threads import cores, in_threads
 @click.option("--stages", default=16, show_default=True, type=click.IntRange(1), help="Meshes.")
 @click.option("--counts", default="4,8,16", show_default=True, help="Meshes of the whole builds.")
 @click.option("--json", "history", type=click.Path(path_type=Path), help="Append a line here.")
+@one_message()
 def main(meshes: Path, stages: int, counts: str, history: Path | None) -> None:
     """Time building a prior of the folder MESHES."""
-    try:
-        sources = list(find_meshes(meshes))
-        record: dict[str, Any] = {"stages": time_stages(_spaced(sources, stages))}
-        entries = [meshes.absolute() / Path(source.relative).parts[0] for source in sources]
-        record["builds"] = time_builds(entries, [int(count) for count in counts.split(",")])
-    except BrrpError as error:
-        raise click.ClickException(str(error)) from error
+    sources = list(find_meshes(meshes))
+    record: dict[str, Any] = {"stages": time_stages(_spaced(sources, stages))}
+    entries = [meshes.absolute() / Path(source.relative).parts[0] for source in sources]
+    record["builds"] = time_builds(entries, [int(count) for count in counts.split(",")])
     if history is not None:
         with history.open("a") as stream:
             stream.write(json.dumps(record) + "\n")

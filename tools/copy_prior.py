@@ -30,7 +30,9 @@ from numpy.typing import NDArray
 # The script also runs from a checkout that is not installed.
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from brrp_cli.errors import BrrpError, PriorError
+from one_message import one_message
+
+from brrp_cli.errors import PriorError
 from brrp_cli.files import atomic_folder, sha256_file
 from brrp_cli.prior.appearance_file import sidecar_file
 from brrp_cli.prior.appearance_index import open_appearance_index
@@ -44,7 +46,6 @@ from brrp_cli.prior.manifest import (
     write_manifest,
 )
 from brrp_cli.prior.store import Prior, open_prior
-from brrp_cli.spoken import command_line
 
 CHUNK = 1_000
 
@@ -55,22 +56,19 @@ CHUNK = 1_000
 @click.option("-o", "--output", required=True, type=click.Path(path_type=Path))
 @click.option("--strange", is_flag=True, help="Copies that look like nothing that is there.")
 @click.option("--overwrite", is_flag=True)
-@command_line()
+@one_message()
 def main(prior_path: Path, objects: int, output: Path, strange: bool, overwrite: bool) -> None:
     """Make a prior of so many OBJECTS in the folder OUTPUT."""
-    try:
-        prior = open_prior(prior_path)
-        if objects < len(prior.names):
-            raise PriorError(
-                "The prior cannot be copied",
-                where=prior_path,
-                expected=f"at most {objects} objects",
-                found=f"{len(prior.names)} objects",
-            )
-        with atomic_folder(output, overwrite=overwrite, mark=FILE) as folder:
-            copy_prior(prior, objects, folder, strange)
-    except BrrpError as error:
-        raise click.ClickException(str(error)) from error
+    prior = open_prior(prior_path)
+    if objects < len(prior.names):
+        raise PriorError(
+            "The prior cannot be copied",
+            where=prior_path,
+            expected=f"at most {objects} objects",
+            found=f"{len(prior.names)} objects",
+        )
+    with atomic_folder(output, overwrite=overwrite, mark=FILE) as folder:
+        copy_prior(prior, objects, folder, strange)
     size = (output / FILE).stat().st_size / 1e6
     click.echo(f"{objects} objects, a manifest of {size:.1f} MB: {output}/")
 

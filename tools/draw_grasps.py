@@ -18,6 +18,7 @@ from PIL import Image
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from both_sides import both_sides
+from one_message import one_message
 
 from brrp_cli.api import open_result
 from brrp_cli.reconstruction import Surface
@@ -37,6 +38,7 @@ def hands_of(path: Path) -> list[Surface]:
     return found
 
 
+@one_message()
 def main() -> None:
     """Write the picture."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])

@@ -14,6 +14,8 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
+from one_message import one_message
+
 from brrp_cli.grasping.gripper import Gripper
 from brrp_cli.grasping.gripper_file import DEFAULT, open_gripper
 
@@ -61,6 +63,7 @@ def measure(ax: Any, start: tuple[float, float], end: tuple[float, float], name:
     )
 
 
+@one_message()
 def main() -> None:
     """Write the picture."""
     import matplotlib

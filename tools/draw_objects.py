@@ -22,6 +22,7 @@ from PIL import Image, ImageDraw
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from both_sides import both_sides
+from one_message import one_message
 
 from brrp_cli.api import open_result
 from brrp_cli.results.read import StoredResult
@@ -49,6 +50,7 @@ def wanted(result: StoredResult, names: list[str]) -> list[tuple[int, str]]:
     return found
 
 
+@one_message()
 def main() -> None:
     """Write the picture."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])

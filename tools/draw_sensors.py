@@ -19,6 +19,7 @@ from PIL import Image, ImageDraw
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
+from one_message import one_message
 from sensor_statistics import read_real
 from tabletop.depth_statistics import table_residual
 
@@ -53,6 +54,7 @@ def row(frame: Frame, name: str) -> NDArray[np.uint8]:
     return np.asarray(joined)
 
 
+@one_message()
 def main() -> None:
     """Write the picture."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])

@@ -25,8 +25,8 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from drawn.composed import draw_composed_shape
 from drawn.household import draw_household_shape
 from drawn.plain import draw_plain_shape
+from one_message import one_message
 
-from brrp_cli.errors import BrrpError
 from brrp_cli.files import write_bytes
 from brrp_cli.seeds import child_rng
 
@@ -52,14 +52,12 @@ KINDS = {"household": _household, "composed": _composed, "plain": _plain}
 @click.option("--count", default=150, show_default=True, type=click.IntRange(1, 1000))
 @click.option("--seed", default=0, show_default=True)
 @click.option("-o", "--output", required=True, type=click.Path(path_type=Path))
+@one_message()
 def main(kind: str, count: int, seed: int, output: Path) -> None:
     """Export COUNT shapes to OUTPUT."""
-    try:
-        for number in tqdm(range(count), desc="shapes"):
-            name, mesh = KINDS[kind](seed, number)
-            write_bytes(output / f"{name}.obj", str(mesh.export(file_type="obj")).encode())
-    except BrrpError as error:
-        raise click.ClickException(str(error)) from error
+    for number in tqdm(range(count), desc="shapes"):
+        name, mesh = KINDS[kind](seed, number)
+        write_bytes(output / f"{name}.obj", str(mesh.export(file_type="obj")).encode())
     click.echo(f"{output}: {count} shapes")
 
 

@@ -25,8 +25,10 @@ from tqdm import tqdm
 # The script also runs from a checkout that is not installed.
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
+from one_message import one_message
+
 from brrp_cli.dependencies import import_library
-from brrp_cli.errors import BrrpError, MeshError
+from brrp_cli.errors import MeshError
 from brrp_cli.files import write_bytes
 
 GROWTH = (0.0002, 0.0004, 0.0008)  # metres on each side; the first that closes the gaps
@@ -36,20 +38,18 @@ GROWTH = (0.0002, 0.0004, 0.0008)  # metres on each side; the first that closes 
 @click.option("--count", default=100, show_default=True, type=click.IntRange(1, 1000))
 @click.option("--first", default=0, show_default=True, type=click.IntRange(0, 999))
 @click.option("-o", "--output", required=True, type=click.Path(path_type=Path))
+@one_message()
 def main(count: int, first: int, output: Path) -> None:
     """Export COUNT shapes, from number FIRST on, to OUTPUT."""
-    try:
-        data = Path(import_library("pybullet_data").getDataPath()) / "random_urdfs"
-        left_out = 0
-        numbers = range(first, min(first + count, 1000))
-        for number in tqdm(numbers, desc="shapes"):
-            solid = one_solid(read_parts(data / f"{number:03d}"))
-            if solid is None:
-                left_out += 1
-            else:
-                write_bytes(output / f"{number:03d}.obj", solid.encode())
-    except BrrpError as error:
-        raise click.ClickException(str(error)) from error
+    data = Path(import_library("pybullet_data").getDataPath()) / "random_urdfs"
+    left_out = 0
+    numbers = range(first, min(first + count, 1000))
+    for number in tqdm(numbers, desc="shapes"):
+        solid = one_solid(read_parts(data / f"{number:03d}"))
+        if solid is None:
+            left_out += 1
+        else:
+            write_bytes(output / f"{number:03d}.obj", solid.encode())
     click.echo(f"{output}: {len(numbers) - left_out} shapes, {left_out} left out")
 
 

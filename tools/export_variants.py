@@ -22,8 +22,8 @@ from tqdm import tqdm
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from drawn.stretched import draw_stretch
+from one_message import one_message
 
-from brrp_cli.errors import BrrpError
 from brrp_cli.files import write_bytes
 from brrp_cli.prior.objects import PriorObject
 from brrp_cli.prior.store import open_prior
@@ -38,16 +38,14 @@ GAIN = 0.3
 @click.option("--count", default=1000, show_default=True, type=click.IntRange(1))
 @click.option("--seed", default=0, show_default=True)
 @click.option("-o", "--output", required=True, type=click.Path(path_type=Path))
+@one_message()
 def main(prior_path: Path, count: int, seed: int, output: Path) -> None:
     """Export COUNT variants to OUTPUT."""
-    try:
-        prior = open_prior(prior_path)
-        for turn, name in enumerate(tqdm(islice(cycle(prior.names), count), "variants", count)):
-            number = turn // len(prior.names)
-            ply = variant(prior.load(name), child_rng(seed, "variant", name, number))
-            write_bytes(output / f"{name}-{number:05d}.ply", ply)
-    except BrrpError as error:
-        raise click.ClickException(str(error)) from error
+    prior = open_prior(prior_path)
+    for turn, name in enumerate(tqdm(islice(cycle(prior.names), count), "variants", count)):
+        number = turn // len(prior.names)
+        ply = variant(prior.load(name), child_rng(seed, "variant", name, number))
+        write_bytes(output / f"{name}-{number:05d}.ply", ply)
     click.echo(f"{output}: {count} variants of {len(prior.names)} objects")
 
 

@@ -27,11 +27,11 @@ from numpy.typing import NDArray
 # The script also runs from a checkout that is not installed.
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
+from one_message import one_message
 from shown_object import shown_object
 
 from brrp_cli.config import preset
 from brrp_cli.config.retrieval import FusionConfig, IlluminantsConfig
-from brrp_cli.errors import BrrpError
 from brrp_cli.evaluation.calibration import expected_calibration_error
 from brrp_cli.ground_truth.scenes import find_scenes
 from brrp_cli.prior.store import Prior, open_prior
@@ -64,19 +64,17 @@ class View:
 @click.option("--segment", "segmented", is_flag=True, help="Masks from the frame alone, too.")
 @click.option("--report", is_flag=True, help="Fit nothing: report with the constants in the code.")
 @click.argument("sets", nargs=-1, required=True, type=click.Path(path_type=Path))
+@one_message()
 def main(
     priors: tuple[Path, ...], absent: bool, segmented: bool, report: bool, sets: tuple[Path, ...]
 ) -> None:
     """Fit on SETS, folders of scenes, and print constants and hit rates."""
     views = []
-    try:
-        for path in priors:
-            prior = open_prior(path)
-            masks = (False, True) if segmented else (False,)
-            seen = [view for folder in sets for made in masks for view in look(prior, folder, made)]
-            views += seen + ([left_out(view) for view in seen] if absent else [])
-    except BrrpError as error:
-        raise click.ClickException(str(error)) from error
+    for path in priors:
+        prior = open_prior(path)
+        masks = (False, True) if segmented else (False,)
+        seen = [view for folder in sets for made in masks for view in look(prior, folder, made)]
+        views += seen + ([left_out(view) for view in seen] if absent else [])
     in_use = preset("default").retrieval.fusion
     weights = in_use if report else fit(views, in_use)
     for count in sorted({view.count for view in views}):

@@ -44,6 +44,8 @@ from tqdm import tqdm
 # The script also runs from a checkout that is not installed.
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
+from one_message import one_message
+
 from brrp_cli.completion.completed_mean import empty_space
 from brrp_cli.completion.network import Network
 from brrp_cli.completion.point_features import COUNT, WHOLE, point_features
@@ -281,6 +283,7 @@ def _taken(
 @click.option("--workers", default=2, show_default=True)
 @click.option("--examples", type=click.Path(path_type=Path), help="Folder to keep examples in.")
 @click.option("-o", "--output", default=WEIGHTS, type=click.Path(path_type=Path))
+@one_message()
 def main(
     sets: tuple[str, ...],
     views: int,

@@ -32,9 +32,9 @@ from numpy.typing import NDArray
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from likelihood.masks import Mask, as_json, collect, read
+from one_message import one_message
 
 from brrp_cli.config import Config, LikelihoodConfig, preset
-from brrp_cli.errors import BrrpError
 from brrp_cli.evaluation.calibration import expected_calibration_error
 from brrp_cli.ground_truth.scenes import find_scenes
 from brrp_cli.prior.store import open_prior
@@ -66,6 +66,7 @@ PULL = 1.0
 @click.option("--only", default=",".join(FITTED), help="Constants to fit. [default: all]")
 @click.option("-o", "--output", required=True, type=click.Path(path_type=Path))
 @click.argument("sets", nargs=-1, type=click.Path(path_type=Path))
+@one_message()
 def main(
     prior_path: Path,
     data_root: Path | None,
@@ -80,21 +81,18 @@ def main(
     if set(names) - set(FITTED):
         raise click.UsageError(f"--only takes some of {','.join(FITTED)}")
     masks = read(output)
-    try:
-        prior = open_prior(prior_path)
-        done = {(mask.group, mask.scene) for mask in masks}
-        for folder in sets:
-            group = f"{folder.name}, {prior_path.name}"
-            group += ", masks from depth" if segmented else ""
-            for scene in progress(find_scenes(folder), group):
-                if (group, scene.name) in done:
-                    continue
-                found = collect(scene, group, prior, data_root, segmented)
-                with output.open("a") as stream:
-                    stream.writelines(json.dumps(as_json(mask)) + "\n" for mask in found)
-                masks += found
-    except BrrpError as error:
-        raise click.ClickException(str(error)) from error
+    prior = open_prior(prior_path)
+    done = {(mask.group, mask.scene) for mask in masks}
+    for folder in sets:
+        group = f"{folder.name}, {prior_path.name}"
+        group += ", masks from depth" if segmented else ""
+        for scene in progress(find_scenes(folder), group):
+            if (group, scene.name) in done:
+                continue
+            found = collect(scene, group, prior, data_root, segmented)
+            with output.open("a") as stream:
+                stream.writelines(json.dumps(as_json(mask)) + "\n" for mask in found)
+            masks += found
     config = preset("default")
     assert config.hypotheses is not None
     if not report:

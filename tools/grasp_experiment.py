@@ -32,9 +32,9 @@ from grasp_trial.film import Film, Take
 from grasp_trial.methods import DEFAULT, METHODS, POINTSDF, scenes_of
 from grasp_trial.report import report
 from grasp_trial.trial import Trials, misplaced
+from one_message import one_message
 
 from brrp_cli.config.grasping import GraspConfig
-from brrp_cli.errors import BrrpError
 from brrp_cli.grasping.grasp import Grasp
 from brrp_cli.grasping.gripper import Gripper
 from brrp_cli.grasping.gripper_file import DEFAULT as HAND
@@ -68,6 +68,7 @@ DRIFT = 0.005
 @click.option("--report", "report_of", type=click.Path(path_type=Path), help="Only tell a file.")
 @click.option("--film", "film_of", type=click.Path(path_type=Path), help="PNG of some grasps.")
 @click.option("-o", "--output", type=click.Path(path_type=Path))
+@one_message()
 def main(
     sets: tuple[str, ...],
     prior_path: Path | None,
@@ -92,43 +93,40 @@ def main(
     if output is None or not sets or set(chosen) - set(known):
         raise click.UsageError(f"name sets, -o FILE, and --methods of {', '.join(known)}")
     film = None if film_of is None else Film()
-    try:
-        prior, retriever = _open(prior_path, seed)
-        hand = open_gripper(gripper)
-        done = {(row["scene"], row["method"]) for row in _rows(output)}
-        for text in sets:
-            name, _, folder = text.partition("=")
-            for scene in find_scenes(Path(folder), slice(0, first)):
-                label = f"{name}/{scene.name}"
-                missing = tuple(method for method in chosen if (label, method) not in done)
-                if not missing:
-                    continue
-                start = time.perf_counter()
-                rows = list(
-                    _scene_rows(
-                        scene,
-                        name,
-                        missing,
-                        hand,
-                        friction,
-                        seed,
-                        data_root,
-                        cache or truth_cache(),
-                        prior,
-                        retriever,
-                        weights,
-                        film,
-                    )
+    prior, retriever = _open(prior_path, seed)
+    hand = open_gripper(gripper)
+    done = {(row["scene"], row["method"]) for row in _rows(output)}
+    for text in sets:
+        name, _, folder = text.partition("=")
+        for scene in find_scenes(Path(folder), slice(0, first)):
+            label = f"{name}/{scene.name}"
+            missing = tuple(method for method in chosen if (label, method) not in done)
+            if not missing:
+                continue
+            start = time.perf_counter()
+            rows = list(
+                _scene_rows(
+                    scene,
+                    name,
+                    missing,
+                    hand,
+                    friction,
+                    seed,
+                    data_root,
+                    cache or truth_cache(),
+                    prior,
+                    retriever,
+                    weights,
+                    film,
                 )
-                with output.open("a") as stream:
-                    stream.writelines(json.dumps(row) + "\n" for row in rows)
-                if film is not None and film_of is not None:
-                    film.save(film_of)
-                held = sum(row["result"] == "held" for row in rows)
-                seconds = time.perf_counter() - start
-                click.echo(f"{label}: {len(rows)} rows, {held} held, {seconds:.0f} s", err=True)
-    except BrrpError as error:
-        raise click.ClickException(str(error)) from error
+            )
+            with output.open("a") as stream:
+                stream.writelines(json.dumps(row) + "\n" for row in rows)
+            if film is not None and film_of is not None:
+                film.save(film_of)
+            held = sum(row["result"] == "held" for row in rows)
+            seconds = time.perf_counter() - start
+            click.echo(f"{label}: {len(rows)} rows, {held} held, {seconds:.0f} s", err=True)
     click.echo(report(_rows(output), DRIFT))
 
 

@@ -53,6 +53,7 @@ from tqdm import tqdm
 # The script also runs from a checkout that is not installed.
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
+from one_message import one_message
 from tabletop.camera import Standpoint
 from tabletop.check import MIN_PIXELS, Distance
 from tabletop.held_out import LEAVE, MIXED, TAKE, chosen
@@ -61,8 +62,7 @@ from tabletop.names_option import prefixes
 from tabletop.scene import LIGHTS, LIMITS, SENSOR_NAMES, Plan, check_depth, make_scene
 
 from brrp_cli.dependencies import import_library
-from brrp_cli.errors import BrrpError, SceneError
-from brrp_cli.spoken import command_line
+from brrp_cli.errors import SceneError
 
 CHECK_EVERY = 5
 
@@ -139,7 +139,7 @@ def _size(_context: click.Context, _option: click.Parameter, value: str) -> tupl
 @click.option("--overwrite", is_flag=True, help="Replace scenes that are there.")
 @click.option("--check", is_flag=True, help="Only check every scene of OUTPUT; write nothing.")
 @click.option("-o", "--output", required=True, type=click.Path(path_type=Path))
-@command_line()
+@one_message()
 def main(
     meshes: Path | None,
     only: tuple[str, ...],
@@ -170,60 +170,55 @@ def main(
     output: Path,
 ) -> None:
     """Make tabletop scenes of MESHES in OUTPUT, and check a fifth of them."""
-    try:
-        if noise != "none" and sensor != "none":
-            raise click.UsageError(
-                "--noise and --sensor exclude each other: a sensor brings its own"
-            )
-        if sum((stacked, on_platform, binned, shelved)) > 1:
-            raise click.UsageError("--stack, --platform, --bin and --shelf exclude one another")
-        held = on_platform or binned or shelved
-        if (walled or robot) and (held or (walled and robot) or views > 1):
-            raise click.UsageError(
-                "--wall and --robot take --views 1, which decides where they stand; no --platform,"
-                " --bin or --shelf, and not both"
-            )
-        if data_root is None:
-            if meshes is None:
-                raise click.UsageError("name the meshes: --meshes, or --data-root with --check")
-            data_root = meshes.absolute().parent
-        data_root = data_root.absolute()
-        if check:
-            _report(_check_all(output, data_root, noise, sensor), output)
-            return
-        if meshes is None:
-            raise click.UsageError("--meshes is needed to make scenes")
-        import_library("pybullet")
-        if sensor == "stereo":
-            import_library("cv2")
-        paths = chosen(find_meshes(meshes, only, skip), held_out)
-        found = tuple(path.absolute() for path in paths)
-        if not found[0].is_relative_to(data_root):
-            raise click.UsageError(f"{meshes} does not lie below --data-root {data_root}")
-        plan = Plan(
-            found,
-            data_root,
-            output,
-            seed,
-            views,
-            noise,
-            size,
-            overwrite,
-            light,
-            sensor,
-            stacked,
-            on_platform,
-            binned,
-            walled,
-            shelved,
-            robot,
-            dark_table,
-            Standpoint(distance, elevation, roll),
-            orbit,
+    if noise != "none" and sensor != "none":
+        raise click.UsageError("--noise and --sensor exclude each other: a sensor brings its own")
+    if sum((stacked, on_platform, binned, shelved)) > 1:
+        raise click.UsageError("--stack, --platform, --bin and --shelf exclude one another")
+    held = on_platform or binned or shelved
+    if (walled or robot) and (held or (walled and robot) or views > 1):
+        raise click.UsageError(
+            "--wall and --robot take --views 1, which decides where they stand; no --platform,"
+            " --bin or --shelf, and not both"
         )
-        _report(list(_make_all(plan, scenes, workers)), output)
-    except BrrpError as error:
-        raise click.ClickException(str(error)) from error
+    if data_root is None:
+        if meshes is None:
+            raise click.UsageError("name the meshes: --meshes, or --data-root with --check")
+        data_root = meshes.absolute().parent
+    data_root = data_root.absolute()
+    if check:
+        _report(_check_all(output, data_root, noise, sensor), output)
+        return
+    if meshes is None:
+        raise click.UsageError("--meshes is needed to make scenes")
+    import_library("pybullet")
+    if sensor == "stereo":
+        import_library("cv2")
+    paths = chosen(find_meshes(meshes, only, skip), held_out)
+    found = tuple(path.absolute() for path in paths)
+    if not found[0].is_relative_to(data_root):
+        raise click.UsageError(f"{meshes} does not lie below --data-root {data_root}")
+    plan = Plan(
+        found,
+        data_root,
+        output,
+        seed,
+        views,
+        noise,
+        size,
+        overwrite,
+        light,
+        sensor,
+        stacked,
+        on_platform,
+        binned,
+        walled,
+        shelved,
+        robot,
+        dark_table,
+        Standpoint(distance, elevation, roll),
+        orbit,
+    )
+    _report(list(_make_all(plan, scenes, workers)), output)
 
 
 def _make_all(plan: Plan, scenes: int, workers: int) -> Iterator[Distance]:

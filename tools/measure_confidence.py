@@ -23,6 +23,8 @@ import trimesh
 # The script also runs from a checkout that is not installed.
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
+from one_message import one_message
+
 from brrp_cli.api import reconstruct
 from brrp_cli.completion.completed_mean import empty_space
 from brrp_cli.config import MeanConfig, preset
@@ -41,6 +43,7 @@ POINTS = 4_000
 MIN_PIXELS = 200
 
 
+@one_message()
 def main() -> None:
     """Measure, or report what was measured."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])

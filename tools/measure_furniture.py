@@ -31,6 +31,7 @@ import trimesh
 # The script also runs from a checkout that is not installed.
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
+from one_message import one_message
 from tabletop.furniture import read_walls
 
 from brrp_cli.config import ObservationConfig
@@ -143,6 +144,7 @@ def line(name: str, found: Found, planned: bool) -> str:
     return text
 
 
+@one_message()
 def main() -> None:
     """See the top of the file."""
     parser = argparse.ArgumentParser(
@@ -152,24 +154,21 @@ def main() -> None:
     parser.add_argument("--prior", type=Path)
     parser.add_argument("--scenes", type=int, default=None, help="of each set, the first N")
     options = parser.parse_args()
-    try:
-        again = None if options.prior is None else Reconstructor(open_prior(options.prior))
-        for folder in options.sets:
-            found = Found()
-            for scene in find_scenes(folder)[: options.scenes]:
-                frame = scene.view(0)
-                if frame.T_world_cam is None:
-                    raise BrrpError("A view has no pose", where=scene.folder)
-                T_cam_world = np.linalg.inv(frame.T_world_cam)
-                found.kind, walls = read_walls(scene.folder)
-                walls = [wall.apply_transform(T_cam_world) for wall in walls]
-                measure_walls(scene, walls, found)
-                if again is not None:
-                    points = np.concatenate([wall.sample(POINTS, seed=0) for wall in walls])
-                    count_grasps(plan_grasps(again(frame)), points, found)
-            print(line(folder.name, found, again is not None), flush=True)
-    except BrrpError as error:
-        sys.exit(str(error))
+    again = None if options.prior is None else Reconstructor(open_prior(options.prior))
+    for folder in options.sets:
+        found = Found()
+        for scene in find_scenes(folder)[: options.scenes]:
+            frame = scene.view(0)
+            if frame.T_world_cam is None:
+                raise BrrpError("A view has no pose", where=scene.folder)
+            T_cam_world = np.linalg.inv(frame.T_world_cam)
+            found.kind, walls = read_walls(scene.folder)
+            walls = [wall.apply_transform(T_cam_world) for wall in walls]
+            measure_walls(scene, walls, found)
+            if again is not None:
+                points = np.concatenate([wall.sample(POINTS, seed=0) for wall in walls])
+                count_grasps(plan_grasps(again(frame)), points, found)
+        print(line(folder.name, found, again is not None), flush=True)
 
 
 if __name__ == "__main__":

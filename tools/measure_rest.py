@@ -24,6 +24,8 @@ import numpy as np
 # The script also runs from a checkout that is not installed.
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
+from one_message import one_message
+
 from brrp_cli.planning.numbers import quaternion_wxyz
 
 SECONDS = 3.0
@@ -55,6 +57,7 @@ class Stillness:
     "--simulator", type=click.Choice(["mujoco", "pybullet"]), default="mujoco", show_default=True
 )
 @click.option("--each", is_flag=True, help="Also a line for each object that does not rest.")
+@one_message()
 def main(sets: tuple[str, ...], simulator: str, each: bool) -> None:
     """Simulate what lies in folders of `brrp export` and tell how much of it rests."""
     found: dict[str, list[Stillness]] = {}

@@ -30,6 +30,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from measure_tracking import apart
+from one_message import one_message
 from score_masks import overlaps
 
 from brrp_cli import Reconstructor, open_prior
@@ -126,6 +127,7 @@ def follow(
 @click.option("--workers", type=click.IntRange(1), default=1, show_default=True)
 @click.option("--poses/--no-poses", default=True, show_default=True, help="Of the cameras.")
 @click.option("--data-root", type=click.Path(path_type=Path), help="Of the true meshes.")
+@one_message()
 def main(
     scenes: tuple[Path, ...],
     prior: Path,

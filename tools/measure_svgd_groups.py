@@ -28,6 +28,8 @@ from torch import Tensor
 # The script also runs from a checkout that is not installed.
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
+from one_message import one_message
+
 from brrp_cli.inference.infer_hypotheses import particles_of
 from brrp_cli.inference.svgd import groups_of, run_svgd
 
@@ -113,6 +115,7 @@ def errors(
 @click.command()
 @click.option("--trials", default=5, show_default=True, type=click.IntRange(1))
 @click.option("--seed", default=0, show_default=True)
+@one_message()
 def main(trials: int, seed: int) -> None:
     """Print the table."""
     torch.set_num_threads(1)

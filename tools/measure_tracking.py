@@ -30,6 +30,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from drawn.composed import draw_composed_shape
 from drawn.household import draw_household_shape
+from one_message import one_message
 
 from brrp_cli.config.tracking import TrackConfig
 from brrp_cli.demo.layout import camera_pose, stand_apart
@@ -207,6 +208,7 @@ def measure(session: object, shown: list[Shown], shapes: list[Shape], seed: int)
 @click.option("--no-poses", is_flag=True, help="Frames do not tell them.")
 @click.option("--every", is_flag=True, help="Print every frame.")
 @click.option("--workers", type=click.IntRange(1), help="Objects at a time. [default: cores]")
+@one_message()
 def main(
     seed: int,
     sequences: int,

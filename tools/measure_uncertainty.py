@@ -28,6 +28,8 @@ from numpy.typing import NDArray
 # The script also runs from a checkout that is not installed.
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
+from one_message import one_message
+
 from brrp_cli.api import reconstruct
 from brrp_cli.config import preset
 from brrp_cli.errors import BrrpError
@@ -47,6 +49,7 @@ EDGES = (0.001, 0.0015, 0.002, 0.003, 0.004, 0.006, 0.01, np.inf)
 LEAST_SHARE = 0.02
 
 
+@one_message()
 def main() -> None:
     """Measure, or report what was measured."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])

@@ -17,6 +17,7 @@ import time
 from pathlib import Path
 
 import numpy as np
+from one_message import one_message
 from PIL import Image
 from scipy.optimize import linear_sum_assignment
 
@@ -69,6 +70,7 @@ def score(
     }
 
 
+@one_message()
 def main() -> None:
     """Score every set that is named."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])

@@ -39,6 +39,7 @@ import numpy as np
 # The script also runs from a checkout that is not installed.
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
+from one_message import one_message
 from shown_object import shown_object
 
 from brrp_cli.config.segmentation import SegmentConfig
@@ -239,6 +240,7 @@ def weights_told(taken: list[Row]) -> str:
     return f"weights  ECE {error:.3f}; right, {', '.join(bins)}"
 
 
+@one_message()
 def main() -> None:
     """Score every set that is named."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])

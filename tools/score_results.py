@@ -29,7 +29,8 @@ import trimesh
 # The script also runs from a checkout that is not installed.
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from brrp_cli.errors import BrrpError
+from one_message import one_message
+
 from brrp_cli.evaluation.evaluate_scene import MIN_PIXELS
 from brrp_cli.frames.frame import Frame
 from brrp_cli.ground_truth.scenes import Scene, find_scenes
@@ -53,6 +54,7 @@ PRINTED = (
 )
 
 
+@one_message()
 def main() -> None:
     """Score one folder."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
@@ -62,12 +64,9 @@ def main() -> None:
     parser.add_argument("--frame", choices=["camera", "world"], help="of the meshes")
     parser.add_argument("-o", "--output", type=Path, help="all metrics as CSV, metres")
     arguments = parser.parse_args()
-    try:
-        scene, view = find_view(arguments.truth)
-        T_cam_mesh = mesh_to_camera(arguments.results, scene.view(view), arguments.frame)
-        rows = score_folder(arguments.results, T_cam_mesh, scene, view, arguments.data_root)
-    except BrrpError as error:
-        sys.exit(f"Error: {error}")
+    scene, view = find_view(arguments.truth)
+    T_cam_mesh = mesh_to_camera(arguments.results, scene.view(view), arguments.frame)
+    rows = score_folder(arguments.results, T_cam_mesh, scene, view, arguments.data_root)
     print(printed(rows))
     if arguments.output is not None:
         with arguments.output.open("w", newline="") as stream:

@@ -32,6 +32,7 @@ from PIL import Image
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
+from one_message import one_message
 from tabletop.depth_statistics import (
     edge_offsets,
     face_residuals,
@@ -139,6 +140,7 @@ def _print(name: str, cells: list[str], markdown: bool) -> None:
         print(f"{name:18s}" + "".join(f"{cell:>18s}" for cell in cells))
 
 
+@one_message()
 def main() -> None:
     """Print the table."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
@@ -149,29 +151,24 @@ def main() -> None:
     _print("", [f"{c} ({u})" for c, u in zip(COLUMNS, UNITS, strict=True)], options.markdown)
     if options.markdown:
         print("| --- |" + " --- |" * len(COLUMNS))
-    try:
-        if options.real:
-            for frame in real_frames(options.real):
-                row = statistics(frame)
-                _print(
-                    Path(str(frame.source)).name, [_text(row[c]) for c in COLUMNS], options.markdown
-                )
-        for text in options.made:
-            name, _, folder = text.partition("=")
-            rows = []
-            for frame in made_frames(Path(folder)):
-                try:
-                    rows.append(statistics(frame))
-                except BrrpError as error:
-                    print(f"left out: {error}", file=sys.stderr)
-            found = summary(rows)
-            cells = [
-                f"{_text(m)} ({_text(low)}-{_text(high)})" if np.isfinite(m) else "-"
-                for m, low, high in (found[c] for c in COLUMNS)
-            ]
-            _print(f"{name} ({len(rows)})", cells, options.markdown)
-    except BrrpError as error:
-        sys.exit(str(error))
+    if options.real:
+        for frame in real_frames(options.real):
+            row = statistics(frame)
+            _print(Path(str(frame.source)).name, [_text(row[c]) for c in COLUMNS], options.markdown)
+    for text in options.made:
+        name, _, folder = text.partition("=")
+        rows = []
+        for frame in made_frames(Path(folder)):
+            try:
+                rows.append(statistics(frame))
+            except BrrpError as error:
+                print(f"left out: {error}", file=sys.stderr)
+        found = summary(rows)
+        cells = [
+            f"{_text(m)} ({_text(low)}-{_text(high)})" if np.isfinite(m) else "-"
+            for m, low, high in (found[c] for c in COLUMNS)
+        ]
+        _print(f"{name} ({len(rows)})", cells, options.markdown)
 
 
 if __name__ == "__main__":

@@ -25,6 +25,7 @@ import numpy as np
 # The script also runs from a checkout that is not installed.
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
+from one_message import one_message
 from speed.measure import own_megabytes
 
 SHARE, MEGABYTES = 0.05, 20.0
@@ -54,6 +55,7 @@ def is_flat(samples: list[float]) -> bool:
 @click.option("--preset", default="default", show_default=True)
 @click.option("--frames", "count", default=500, show_default=True, type=click.IntRange(4))
 @click.option("--helpers", default=0, show_default=True, type=click.IntRange(0))
+@one_message()
 def main(
     frames: tuple[Path, ...], prior: Path | None, preset: str, count: int, helpers: int
 ) -> None:

@@ -19,8 +19,9 @@ import numpy as np
 # The script also runs from a checkout that is not installed.
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
+from one_message import one_message
+
 from brrp_cli.config import preset
-from brrp_cli.errors import BrrpError
 from brrp_cli.frames.readers import read_frame
 from brrp_cli.observation.ray_samples import scene_plane
 from brrp_cli.observation.strays import without_strays
@@ -37,17 +38,15 @@ from brrp_cli.retrieval.similarity import lit_histograms, similarity
 @click.command()
 @click.option("--prior", "prior_path", required=True, type=click.Path(path_type=Path))
 @click.argument("frame_path", type=click.Path(path_type=Path))
+@one_message()
 def main(prior_path: Path, frame_path: Path) -> None:
     """Time a lookup of every object of FRAME."""
-    try:
-        frame = read_frame(frame_path)
-        start = time.process_time()
-        prior = open_prior(prior_path)
-        opened = time.process_time() - start
-        retriever = AppearanceRetriever(prior, preset("default"), 0)
-        started = time.process_time() - start - opened
-    except BrrpError as error:
-        raise click.ClickException(str(error)) from error
+    frame = read_frame(frame_path)
+    start = time.process_time()
+    prior = open_prior(prior_path)
+    opened = time.process_time() - start
+    retriever = AppearanceRetriever(prior, preset("default"), 0)
+    started = time.process_time() - start - opened
     looks = prior.appearance
     config = preset("default")
     own = config.retrieval

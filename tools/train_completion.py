@@ -30,6 +30,7 @@ from tqdm import tqdm
 # The script also runs from a checkout that is not installed.
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
+from one_message import one_message
 from training.scene_sets import check_names
 from training.watched import late_after, run_watched
 
@@ -69,6 +70,7 @@ SETS = f"SCENES:DATA_ROOT or SCENES:DATA_ROOT:{MEASURED}"
 @click.option("--seed", default=0, show_default=True)
 @click.option("--minutes", type=click.FloatRange(0), help="Stop, to go on later, after so long.")
 @click.option("--examples-only", is_flag=True, help="Make the examples and stop.")
+@one_message()
 def main(
     sets: tuple[str, ...],
     output: Path,
@@ -91,48 +93,45 @@ def main(
     from brrp_cli.completion.shape_network import ShapeNetworkConfig
 
     late = late_after(minutes)
-    try:
-        if cooling > epochs:
-            raise BrrpError("--cooling is a part of --epochs", found=f"{cooling} of {epochs}")
-        folder = output / "examples"
-        wanted = []
-        check_names(Path(each.partition(":")[0]) for each in sets)
-        for each in sets:
-            scenes, _, rest = each.partition(":")
-            root, _, how = rest.partition(":")
-            if how not in ("", MEASURED):
-                raise BrrpError("A set is not understood", where=each, expected=SETS, found=how)
-            wanted += [
-                Wanted(scene, view, Path(root), how == MEASURED)
-                for scene in find_scenes(Path(scenes))
-                for view in range(views)
-            ]
-        for _ in tqdm(make_all(wanted, seed, folder), desc="examples", total=len(wanted)):
-            pass
-        paths = sorted(folder.glob("*/*.npz"))
-        if not paths:
-            raise BrrpError("There are no examples", where=folder, fix="name SETS to make them of")
-        if examples_only:
-            click.echo(f"Examples of {len(paths)} views: {folder}/")
-            return
-        kept = held_names(names_in(paths), validation, seed)
-        train = read_examples(paths, lambda name: name not in kept)
-        held = read_examples(paths, lambda name: name in kept)
-        if not len(train) or not len(held):
-            raise BrrpError(
-                "There is too little to train on or to validate with",
-                where=folder,
-                found=f"{len(train)} and {len(held)} objects",
-                fix="make more scenes",
-            )
-        config = TrainingConfig(
-            epochs=epochs, cooling=cooling, batch=batch, rate=rate, seed=seed, points=points
+    if cooling > epochs:
+        raise BrrpError("--cooling is a part of --epochs", found=f"{cooling} of {epochs}")
+    folder = output / "examples"
+    wanted = []
+    check_names(Path(each.partition(":")[0]) for each in sets)
+    for each in sets:
+        scenes, _, rest = each.partition(":")
+        root, _, how = rest.partition(":")
+        if how not in ("", MEASURED):
+            raise BrrpError("A set is not understood", where=each, expected=SETS, found=how)
+        wanted += [
+            Wanted(scene, view, Path(root), how == MEASURED)
+            for scene in find_scenes(Path(scenes))
+            for view in range(views)
+        ]
+    for _ in tqdm(make_all(wanted, seed, folder), desc="examples", total=len(wanted)):
+        pass
+    paths = sorted(folder.glob("*/*.npz"))
+    if not paths:
+        raise BrrpError("There are no examples", where=folder, fix="name SETS to make them of")
+    if examples_only:
+        click.echo(f"Examples of {len(paths)} views: {folder}/")
+        return
+    kept = held_names(names_in(paths), validation, seed)
+    train = read_examples(paths, lambda name: name not in kept)
+    held = read_examples(paths, lambda name: name in kept)
+    if not len(train) or not len(held):
+        raise BrrpError(
+            "There is too little to train on or to validate with",
+            where=folder,
+            found=f"{len(train)} and {len(held)} objects",
+            fix="make more scenes",
         )
-        network = started(ShapeNetworkConfig(), fitted(), seed) if begin is None else resumed(begin)
-        training = Training(network, config, output, len(train))
-        finished = run_watched(training, train, held, late)
-    except BrrpError as error:
-        raise click.ClickException(str(error)) from error
+    config = TrainingConfig(
+        epochs=epochs, cooling=cooling, batch=batch, rate=rate, seed=seed, points=points
+    )
+    network = started(ShapeNetworkConfig(), fitted(), seed) if begin is None else resumed(begin)
+    training = Training(network, config, output, len(train))
+    finished = run_watched(training, train, held, late)
     if not finished:
         return
     best = training.best(held)

@@ -27,6 +27,7 @@ from tqdm import tqdm
 # The script also runs from a checkout that is not installed.
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
+from one_message import one_message
 from training.scene_sets import check_names
 from training.watched import late_after, run_watched
 
@@ -71,6 +72,7 @@ SETS = f"SCENES or SCENES:{MEASURED}"
 @click.option("--workers", default=2, show_default=True, type=click.IntRange(1))
 @click.option("--minutes", type=click.FloatRange(0), help="Stop, to go on later, after so long.")
 @click.option("--examples-only", is_flag=True, help="Make the examples and stop.")
+@one_message()
 def main(
     sets: tuple[str, ...],
     output: Path,
@@ -94,50 +96,47 @@ def main(
     from training.masks import Training, TrainingConfig, resumed, started
 
     late = late_after(minutes)
-    try:
-        if cooling > epochs:
-            raise BrrpError("--cooling is a part of --epochs", found=f"{cooling} of {epochs}")
-        folder = output / "examples"
-        wanted = []
-        check_names(Path(each.partition(":")[0]) for each in sets)
-        for each in sets:
-            scenes, _, how = each.partition(":")
-            if how not in ("", MEASURED):
-                raise BrrpError("A set is not understood", where=each, expected=SETS, found=how)
-            wanted += [
-                Wanted(scene, view, how == MEASURED)
-                for scene in find_scenes(Path(scenes))
-                for view in range(views)
-            ]
-        made = make_all(wanted, seed, folder, workers)
-        for _ in tqdm(made, desc="examples", total=len(wanted)):
-            pass
-        paths = sorted(folder.glob("*/*.npz"))
-        if examples_only:
-            click.echo(f"Examples of {len(paths)} views: {folder}/")
-            return
-        train = read_examples([path for path in paths if not is_held(path, validation, seed)])
-        held = read_examples([path for path in paths if is_held(path, validation, seed)])
-        if not len(train) or not len(held):
-            raise BrrpError(
-                "There is too little to train on or to validate with",
-                where=folder,
-                found=f"{len(train)} and {len(held)} views",
-                fix="name SETS to make examples of, or more of them",
-            )
-        config = TrainingConfig(
-            epochs=epochs,
-            cooling=cooling,
-            batch=batch,
-            rate=rate,
-            seed=seed,
-            precision=precision,
+    if cooling > epochs:
+        raise BrrpError("--cooling is a part of --epochs", found=f"{cooling} of {epochs}")
+    folder = output / "examples"
+    wanted = []
+    check_names(Path(each.partition(":")[0]) for each in sets)
+    for each in sets:
+        scenes, _, how = each.partition(":")
+        if how not in ("", MEASURED):
+            raise BrrpError("A set is not understood", where=each, expected=SETS, found=how)
+        wanted += [
+            Wanted(scene, view, how == MEASURED)
+            for scene in find_scenes(Path(scenes))
+            for view in range(views)
+        ]
+    made = make_all(wanted, seed, folder, workers)
+    for _ in tqdm(made, desc="examples", total=len(wanted)):
+        pass
+    paths = sorted(folder.glob("*/*.npz"))
+    if examples_only:
+        click.echo(f"Examples of {len(paths)} views: {folder}/")
+        return
+    train = read_examples([path for path in paths if not is_held(path, validation, seed)])
+    held = read_examples([path for path in paths if is_held(path, validation, seed)])
+    if not len(train) or not len(held):
+        raise BrrpError(
+            "There is too little to train on or to validate with",
+            where=folder,
+            found=f"{len(train)} and {len(held)} views",
+            fix="name SETS to make examples of, or more of them",
         )
-        network = started(AffinityNetworkConfig(), seed) if begin is None else resumed(begin, seed)
-        training = Training(network, config, output, len(train))
-        finished = run_watched(training, train, held, late)
-    except BrrpError as error:
-        raise click.ClickException(str(error)) from error
+    config = TrainingConfig(
+        epochs=epochs,
+        cooling=cooling,
+        batch=batch,
+        rate=rate,
+        seed=seed,
+        precision=precision,
+    )
+    network = started(AffinityNetworkConfig(), seed) if begin is None else resumed(begin, seed)
+    training = Training(network, config, output, len(train))
+    finished = run_watched(training, train, held, late)
     if not finished:
         return
     record = min(training.progress.history, key=lambda each: each["held_loss"])

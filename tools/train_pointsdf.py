@@ -34,6 +34,7 @@ from tqdm import tqdm
 # The script also runs from a checkout that is not installed.
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
+from one_message import one_message
 from training.examples import TRUTHS, Recipe, make_examples, read_examples
 from training.scene_sets import check_names
 from training.watched import late_after, run_watched
@@ -78,6 +79,7 @@ from brrp_cli.ground_truth.true_meshes import truth_cache
 @click.option("--minutes", type=click.FloatRange(0), help="Stop, to go on later, after so long.")
 @click.option("--every", default=200, show_default=True, type=click.IntRange(1), help="Steps.")
 @click.option("--examples-only", is_flag=True, help="Make the examples and stop.")
+@one_message()
 def main(
     scenes: tuple[Path, ...],
     output: Path,
@@ -105,58 +107,55 @@ def main(
     from brrp_cli.methods.pointsdf.network import NetworkConfig
 
     late = late_after(minutes)
-    try:
-        if cooling > epochs:
-            raise BrrpError("--cooling is a part of --epochs", found=f"{cooling} of {epochs}")
-        network = narrowed(NetworkConfig(), width)
-        recipe = Recipe(truth, network.points, scale=network.scale)
-        folder = output / "examples"
-        check_names(scenes)
-        for source in scenes:
-            found = find_scenes(source)
-            root = data_root or find_data_root(found, source)
-            made = make_examples(found, root.absolute(), recipe, folder, truth_cache())
-            for _ in tqdm(made, desc=source.name, total=len(found)):
-                pass
-        paths = sorted(folder.glob("*.h5"))
-        if len(paths) < 2:
-            raise BrrpError("Two scenes at least are needed", where=folder, found=len(paths))
-        if examples_only:
-            click.echo(f"Examples of {len(paths)} scenes: {folder}/")
-            return
-        names = split([path.name for path in paths], validation, seed)
-        train, held = (read_examples([folder / n for n in group], recipe) for group in names)
-        if len(train) < 2 or not len(held):
-            raise BrrpError(
-                "There is too little to train on or to validate with",
-                where=folder,
-                found=f"{len(train)} and {len(held)} objects",
-                fix="make more scenes",
-            )
-        about = {
-            "name": output.name,
-            "scenes": len(paths),
-            "validation_scenes": len(names[1]),
-            "objects": len(train),
-            "validation_objects": len(held),
-            "truth": truth,
-            "meshes": sorted(Counter(train.names)),
-        }
-        config = TrainingConfig(
-            epochs=epochs,
-            cooling=cooling,
-            batch=batch,
-            rate=rate,
-            seed=seed,
-            queries=queries,
-            noise=noise,
-            precision=precision,
+    if cooling > epochs:
+        raise BrrpError("--cooling is a part of --epochs", found=f"{cooling} of {epochs}")
+    network = narrowed(NetworkConfig(), width)
+    recipe = Recipe(truth, network.points, scale=network.scale)
+    folder = output / "examples"
+    check_names(scenes)
+    for source in scenes:
+        found = find_scenes(source)
+        root = data_root or find_data_root(found, source)
+        made = make_examples(found, root.absolute(), recipe, folder, truth_cache())
+        for _ in tqdm(made, desc=source.name, total=len(found)):
+            pass
+    paths = sorted(folder.glob("*.h5"))
+    if len(paths) < 2:
+        raise BrrpError("Two scenes at least are needed", where=folder, found=len(paths))
+    if examples_only:
+        click.echo(f"Examples of {len(paths)} scenes: {folder}/")
+        return
+    names = split([path.name for path in paths], validation, seed)
+    train, held = (read_examples([folder / n for n in group], recipe) for group in names)
+    if len(train) < 2 or not len(held):
+        raise BrrpError(
+            "There is too little to train on or to validate with",
+            where=folder,
+            found=f"{len(train)} and {len(held)} objects",
+            fix="make more scenes",
         )
-        weights = output / f"{output.name}.safetensors"
-        training = Training(network, config, output, weights, about, pick_device(device))
-        run_watched(training, train, held, late, every=every, line=_line)
-    except BrrpError as error:
-        raise click.ClickException(str(error)) from error
+    about = {
+        "name": output.name,
+        "scenes": len(paths),
+        "validation_scenes": len(names[1]),
+        "objects": len(train),
+        "validation_objects": len(held),
+        "truth": truth,
+        "meshes": sorted(Counter(train.names)),
+    }
+    config = TrainingConfig(
+        epochs=epochs,
+        cooling=cooling,
+        batch=batch,
+        rate=rate,
+        seed=seed,
+        queries=queries,
+        noise=noise,
+        precision=precision,
+    )
+    weights = output / f"{output.name}.safetensors"
+    training = Training(network, config, output, weights, about, pick_device(device))
+    run_watched(training, train, held, late, every=every, line=_line)
     click.echo(f"Wrote {output}/ ({weights.name}, history.json, checkpoint.pt)")
 
 
