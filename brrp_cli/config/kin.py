@@ -81,6 +81,7 @@ class KinConfig:
     enabled: bool = True
     least_unknown: float = share(0.05)
     objects: int = 400
+    usual: float = 0.15
     poses: int = 4
     least_pose: float = share(0.04)
     nodes: int = 16

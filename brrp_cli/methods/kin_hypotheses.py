@@ -20,6 +20,7 @@ from brrp_cli.kin.library import Library
 from brrp_cli.kin.opening import opening
 from brrp_cli.kin.placement import distance_and_slopes
 from brrp_cli.kin.stretched import BentShape, bent_shape, unbent_shape
+from brrp_cli.kin.usual_size import for_size
 from brrp_cli.observation.support_plane import Plane
 from brrp_cli.prior.store import Prior
 from brrp_cli.seeds import child_rng
@@ -64,6 +65,7 @@ def kin_hypotheses(
     if len(evidence.seen) < kin.least_seen:
         return []
     library = kin_library(prior, kin)
+    kin = for_size(kin, evidence.seen)
     fits = fit_kin(evidence, library, kin)
     rows = _distinct(fits, library, kin)
     hollow = library.hollow[fits.placements.stance[rows]]
