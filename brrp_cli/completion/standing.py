@@ -49,18 +49,20 @@ def standing(
 def on_others(part: VisiblePart, config: StandingConfig) -> bool:
     """Whether it may stand on other objects: whether these touch the lowest of what is seen."""
     frame, plane = part.frame, part.plane
-    own = frame.segmap == part.object_id
-    if plane is None or not own.any():
+    if plane is None:
         return False
+    own = frame.segmap == part.object_id
     rows, columns = np.nonzero(own)
     window = tuple(slice(max(0, int(e.min()) - 1), int(e.max()) + 2) for e in (rows, columns))
     own, points, ids = own[window], frame.points[window], frame.segmap[window]
     height = plane.signed_distance(points.reshape(-1, 3)).reshape(own.shape)
     border = own & ~binary_erosion(own, np.ones((3, 3), bool)) & np.isfinite(height)
-    low = border & (height < height[border].min() + config.foot) if border.any() else border
+    if not border.any():
+        return False
+    low = border & (height < height[border].min() + config.foot)
     touches = np.zeros_like(own)
     for axis, step in ((0, 1), (0, -1), (1, 1), (1, -1)):
         beside = np.roll(ids, step, axis)
         gap = np.linalg.norm(np.roll(points, step, axis) - points, axis=-1)
         touches |= (beside != part.object_id) & (beside != BACKGROUND) & (gap < config.gap)
-    return bool((low & touches).sum() >= config.touched * max(1, low.sum()))
+    return bool((low & touches).sum() >= config.touched * low.sum())
