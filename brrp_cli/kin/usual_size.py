@@ -1,7 +1,7 @@
 """What counts as near for a large object.
 
-Two pots differ by shares of their size: one of 30 cm is off its kin by millimetres where a cup is
-off by fractions of one. The lengths of the configuration are those of things of the usual size.
+Kin differ by shares of their size: two pots of 30 cm by millimetres where two cups differ by
+fractions of one. The lengths of the configuration are those of things of the usual size.
 """
 
 from __future__ import annotations

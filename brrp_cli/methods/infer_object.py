@@ -167,6 +167,7 @@ def _completed(
     every[~empty] = views.averaged(alone[~empty], left)
     if axis is not None:
         every = round_logits(axis, nodes, empty, every, part, shell, config)
+    # After the turn: what is round stands as a whole.
     if plane is not None and config.standing.enabled and not on_others(part, config.standing):
         thought = np.clip(every[~empty], -config.limit, config.limit)
         heights = plane.signed_distance(left)
