@@ -37,10 +37,10 @@ class FittedDepthConfig:
     """
 
     reaches: tuple[float, float, float] = (0.003, 0.006, 0.012)
-    least_pixels: int = 2
+    least_pixels: int = 3
     most_pixels: int = 12
     gate: float = 3.0
-    fit: float = 1.2
+    fit: float = 2.0
     wave: float = 0.5
 
 

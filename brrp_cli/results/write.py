@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from brrp_cli.dependencies import import_open3d
 from brrp_cli.errors import OutputError
 from brrp_cli.files import atomic_folder, check_writable, refuse_folder
 from brrp_cli.frames.frame import Frame
@@ -209,17 +210,17 @@ def _surface_record(surface: Surface, T_target_cam: NDArray[np.float64]) -> dict
 
 
 def _oriented_box(vertices: NDArray[np.floating]) -> dict[str, Any]:
-    """The smallest box around (n, 3) vertices: its rigid pose, from the box's middle and axes to
+    """The smallest box around (n, 3) vertices that Open3D finds: its rigid pose, from its axes to
     the frame of the vertices, and its extents along these axes, longest first, metres."""
-    from trimesh.bounds import oriented_bounds
-
-    T_box_frame, extents = oriented_bounds(vertices)
-    order = np.argsort(-np.asarray(extents), kind="stable")
-    T_frame_box = np.linalg.inv(T_box_frame)
-    axes = T_frame_box[:3, order]
+    o3d = import_open3d()
+    points = o3d.utility.Vector3dVector(np.ascontiguousarray(vertices, np.float64))
+    box = o3d.geometry.OrientedBoundingBox.create_from_points_minimal(points)
+    order = np.argsort(-np.asarray(box.extent), kind="stable")
+    axes = np.asarray(box.R)[:, order]
     axes[:, 2] *= np.sign(np.linalg.det(axes))
-    T_frame_box[:3, :3] = axes
-    return {"T_frame_box": T_frame_box.tolist(), "extents": np.asarray(extents)[order].tolist()}
+    T_frame_box = np.eye(4)
+    T_frame_box[:3, :3], T_frame_box[:3, 3] = axes, box.center
+    return {"T_frame_box": T_frame_box.tolist(), "extents": np.asarray(box.extent)[order].tolist()}
 
 
 def _retrieved_record(found: Retrieved, T_target_cam: NDArray[np.float64]) -> dict[str, Any]:

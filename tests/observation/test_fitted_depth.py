@@ -7,6 +7,7 @@ import pytest
 from table_scene import TABLE, ball, box, in_camera, photograph, placed
 
 from brrp_cli.config import FittedDepthConfig, SensorConfig
+from brrp_cli.depth_noise.structured_light import add_depth_noise
 from brrp_cli.frames.frame import Frame
 from brrp_cli.observation.fitted_depth import smoothed
 from brrp_cli.observation.pixel_noise import pixel_noise
@@ -38,6 +39,21 @@ def test_noise_is_averaged(mesh):
     before, after = errors({OWN: in_camera(mesh, placed(0.0, 0.0, 0.5))}, 0.001)
     assert np.abs(after).mean() < 0.7 * np.abs(before).mean()
     assert abs(after.mean()) < 0.0001
+
+
+@pytest.mark.parametrize("mesh", [box(), ball(), solids.cylinder(0.03, 0.1)])
+def test_a_structured_light_cameras_noise_is_averaged(mesh):
+    """It reads pixels beside, and in steps, which is no Gaussian noise."""
+    clean = photograph({OWN: in_camera(mesh, placed(0.0, 0.0, 0.5))})
+    depth = add_depth_noise(clean.depth, clean.K, np.random.default_rng(0))
+    seen = np.where(depth > 0, depth, np.nan)[..., None]
+    frame = clean.with_points((clean.points / clean.depth[..., None] * seen).astype(np.float32))
+    noise = pixel_noise(frame, TABLE, SensorConfig())
+    found = smoothed(frame, OWN, noise, CONFIG)
+    own = (clean.segmap == OWN) & frame.valid & ~noise.at_jump
+    before, after = (np.abs(each.depth - clean.depth)[own] for each in (frame, found))
+    assert after.mean() < 0.5 * before.mean()
+    assert (found.depth[own] == frame.depth[own]).mean() < 0.05
 
 
 def test_no_edge_is_rounded_off():
