@@ -1,11 +1,12 @@
 """What the depth of an object says of its surface: bounds of the completion's logit.
 
-What was seen is a surface, to within the noise: the logit is 0 there, and a ramp about it. Behind
-it the ramp is the least that the logit may be, for as thick as the thinnest wall; so a wall is
-there however thin the network makes it. In front of it the ramp is what the logit is, where the
-depth is the object's own beyond doubt. Elsewhere it says nothing: sensors mix both sides of a jump
-of depth, and flatten what lies on a table. There the surface is taken to be a little nearer than it
-was measured.
+What was seen is a surface, to within the noise: the logit is 0 there, and a ramp about it, for as
+thick as the thinnest wall. Where the depth is the object's own beyond doubt, the ramp is what the
+logit is, on both sides: were it more on one of them, a mesh between nodes of a grid would lie
+nearer to the other. Elsewhere the ramp is the least that the logit may be behind what was seen, so
+that a wall is there however thin the network makes it, and says nothing in front: sensors mix both
+sides of a jump of depth, and flatten what lies on a table. There the surface is taken to be a
+little nearer than it was measured.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ from numpy.typing import NDArray
 
 from brrp_cli.config import MeanConfig, RampConfig
 from brrp_cli.frames.frame import Frame
-from brrp_cli.frames.projection import at_pixels, depth_behind
+from brrp_cli.frames.projection import at_pixels, between_pixels, depth_behind
 from brrp_cli.observation.fitted_depth import smoothed
 from brrp_cli.observation.pixel_noise import PixelNoise
 from brrp_cli.observation.support_plane import Plane
@@ -54,12 +55,21 @@ class SeenSurface:
 
     def bounds(self, points: Array, shell: float, config: MeanConfig) -> Bounds:
         """At points (n, 3), metres, camera frame; shell : metres, how thick what was seen is."""
-        behind = -depth_behind(points, self.frame)
+        behind = self.behind(points)
         own = at_pixels(points, self.frame.segmap, self.frame) == self.object_id
         own &= np.isfinite(behind)
         sure = at_pixels(points, self.sure, self.frame) == 1
         behind += np.where(sure, 0.0, self.nearer)
         return ramp_bounds(behind, own, own & sure, shell, config)
+
+    def behind(self, points: Array) -> Array:
+        """Metres (n,) from what was seen to points (n, 3), along the camera's axis; NaN where there
+        is no depth. Between sure pixels the surface is a plane: whole pixels would make stairs of
+        what leans."""
+        with np.errstate(divide="ignore"):
+            inverse = np.where(self.sure, 1 / self.frame.depth, np.nan)
+        between = points[:, 2] - 1 / between_pixels(points, inverse, self.frame)
+        return np.where(np.isfinite(between), between, -depth_behind(points, self.frame))
 
 
 def seen_surface(
@@ -88,13 +98,14 @@ def ramp_bounds(
     config: MeanConfig,
 ) -> Bounds:
     """Of points that lie `behind` (n,) metres behind what was seen, where it is the object's `own`
-    (n,); in front of it only where that is `sure` (n,). shell : as in `SeenSurface.bounds`."""
+    (n,); the most, and any in front of it, only where that is `sure` (n,). shell : as in
+    `SeenSurface.bounds`."""
     ramp = config.shell_logit / config.ramp.width * np.clip(behind, -shell, shell)
     front = sure & (behind < 0)
     told = own & (behind < shell) & np.where(front, behind > -shell, behind >= 0)
     return Bounds(
         np.where(told, np.maximum(ramp, -config.limit), -config.limit),
-        np.where(front, np.maximum(ramp, -config.limit), config.limit),
+        np.where(sure & (behind < shell), np.maximum(ramp, -config.limit), config.limit),
     )
 
 

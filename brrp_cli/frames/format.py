@@ -68,7 +68,7 @@ class Format:
     last: bool = False
 
 
-def counted(index: str) -> int | None:
+def as_number(index: str) -> int | None:
     """The number that an index is; None where it is a name."""
     return int(index) if index.isdecimal() and len(index) < _DIGITS else None
 
@@ -84,7 +84,7 @@ def pick(items: list[T], index: str | None, names: list[str], path: Path) -> T:
         return items[0]
     if index in names:
         return items[names.index(index)]
-    number = counted(index)
+    number = as_number(index)
     if number is not None and number < len(items):
         return items[number]
     shown = ", ".join(names[:4]) + (", ..." if len(names) > 4 else "")

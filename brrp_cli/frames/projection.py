@@ -24,6 +24,23 @@ def at_pixels(
     return np.where(inside, image.ravel()[pixel], np.nan)
 
 
+def between_pixels(
+    points: NDArray[np.floating], image: NDArray[np.floating], frame: Frame
+) -> NDArray[np.float64]:
+    """Values (n,) of an image (H, W) at points (n, 3), camera frame, interpolated between the four
+    pixels around each; NaN where one of these has none, outside of the image and behind the
+    camera."""
+    from scipy.ndimage import map_coordinates
+
+    z = points[:, 2]
+    with np.errstate(all="ignore"):
+        u, v = (
+            np.where(z > 0, points[:, i] / z * frame.K[i, i] + frame.K[i, 2], -1.0)
+            for i in range(2)
+        )
+    return np.asarray(map_coordinates(image, (v, u), np.float64, order=1, cval=np.nan))
+
+
 def pixel_numbers(
     points: NDArray[np.floating], frame: Frame
 ) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:

@@ -14,7 +14,7 @@ from brrp_cli.completion.network import Network, fitted, from_bytes
 from brrp_cli.completion.point_features import COUNT, point_features
 from brrp_cli.completion.visible_part import visible_part
 from brrp_cli.config import CompletionConfig, MeanConfig
-from brrp_cli.frames.projection import at_pixels, depth_behind
+from brrp_cli.frames.projection import at_pixels
 from brrp_cli.geometry import transform_points
 from brrp_cli.inference.mean_grid import MeanGrid, grid_over
 from brrp_cli.observation.support_plane import Plane
@@ -98,7 +98,7 @@ def test_what_is_seen_has_some_thickness_whatever_the_network_says():
     thinks = network_grid(nodes, empty, part_of(frame), MEAN)[~empty]
     points, found = nodes[~empty], mean.values.astype(float)[~empty]
     surface = surface_seen(frame, 5)
-    behind = -depth_behind(points, surface.frame)
+    behind = surface.behind(points)
     thickness = max(MEAN.shell, MEAN.shell_nodes * mean.spacing)
     own = at_pixels(points, frame.segmap, frame) == 5
     wall = own & (behind > MEAN.ramp.width) & (behind < thickness - surface.nearer)

@@ -42,9 +42,9 @@ def at(column, z, row=40):
 @pytest.mark.parametrize(
     ("point", "least", "most", "why"),
     [
-        (at(60, 1.0), 0.0, None, "on it"),
-        (at(60, 1.0015), 1.0, None, "half a ramp behind it"),
-        (at(60, 1.0035), 2.33, None, "at the end of the shell"),
+        (at(60, 1.0), 0.0, 0.0, "on it"),
+        (at(60, 1.0015), 1.0, 1.0, "half a ramp behind it"),
+        (at(60, 1.0035), 2.33, 2.33, "at the end of the shell"),
         (at(60, 1.005), None, None, "behind the shell"),
         (at(60, 0.9985), -1.0, -1.0, "half a ramp in front of it"),
         (at(60, 0.99), None, -2.67, "far in front of it"),
@@ -61,6 +61,25 @@ def test_bounds_are_the_ramp_on_the_sides_that_are_known(point, least, most, why
     found = surface.bounds(np.array([point]), SHELL, MEAN)
     assert found.least[0] == pytest.approx(-MEAN.limit if least is None else least, abs=0.02), why
     assert found.most[0] == pytest.approx(MEAN.limit if most is None else most, abs=0.02), why
+
+
+def test_a_leaning_surface_has_no_stairs():
+    """A plane, of which 1 / z is a linear function of the pixel; a pixel's own depth is none."""
+    columns = np.arange(100.0)
+    frame = wall(1 / (1.0 + 0.02 * (columns[40:80] - 60)))
+    surface = SeenSurface(frame, OWN, frame.segmap == OWN, 0.001)
+    between = np.linspace(55, 65, 41)
+    on_it = np.array([at(column, 1 / (1.0 + 0.02 * (column - 60))) for column in between])
+    np.testing.assert_allclose(surface.behind(on_it), 0, atol=1e-6)
+
+
+def test_between_sure_pixels_and_others_the_nearest_one_counts():
+    frame = wall()
+    sure = np.zeros(frame.shape, bool)
+    sure[:, :60] = True
+    surface = SeenSurface(frame, OWN, sure, 0.001)
+    found = surface.behind(np.array([at(59.7, 1.002), at(79.4, 1.002), at(79.6, 1.002)]))
+    np.testing.assert_allclose(found, [0.002, 0.002, -0.998], atol=1e-6)
 
 
 def test_depth_at_a_jump_says_nothing_of_what_is_in_front():

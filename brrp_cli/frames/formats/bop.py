@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from brrp_cli.errors import FrameError
 from brrp_cli.files import parse_json
 from brrp_cli.frames.build import make_frame
-from brrp_cli.frames.format import Format, Request, counted, pick
+from brrp_cli.frames.format import Format, Request, as_number, pick
 from brrp_cli.frames.frame import Frame
 from brrp_cli.frames.pixels import read_colour, read_depth, read_masks
 
@@ -176,7 +176,7 @@ def read(path: Path, request: Request) -> Frame:
     images = sorted(read_table(scene / CAMERA))
     # Images go by the number that they have, not by their place.
     names = [str(image) for image in images]
-    number = None if index is None else str(counted(index))
+    number = None if index is None else str(as_number(index))
     if number is not None and number not in names:
         raise FrameError(
             "The scene has no such image",

@@ -10,7 +10,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from brrp_cli.errors import FrameError
-from brrp_cli.frames.format import Format, Request, counted
+from brrp_cli.frames.format import Format, Request, as_number
 from brrp_cli.frames.formats.folder import pairs_in
 from brrp_cli.frames.frame import Frame
 
@@ -53,7 +53,7 @@ def read(path: Path, request: Request) -> Frame:
     if index is None:
         index = next(iter(parts))
     elif index.partition("/")[0] not in parts:
-        every, number = names(path, request), counted(index)
+        every, number = names(path, request), as_number(index)
         if number is None or number >= len(every):
             shown = ", ".join(every[:4]) + (", ..." if len(every) > 4 else "")
             raise FrameError(

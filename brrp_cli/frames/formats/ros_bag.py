@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from brrp_cli.errors import BrrpError, DependencyError, FrameError
-from brrp_cli.frames.format import Format, Request, counted
+from brrp_cli.frames.format import Format, Request, as_number
 from brrp_cli.frames.frame import Frame
 from brrp_cli.frames.ros_images import frame_of, is_depth
 
@@ -40,7 +40,7 @@ def read(path: Path, request: Request) -> Frame:
     have to name them. Errors: FrameError; DependencyError without `rosbags`.
     """
     request.refuse(path, "the bag's camera_info", intrinsics="--intrinsics")
-    index = counted(request.index or "0")
+    index = as_number(request.index or "0")
     if index is None:
         raise FrameError(
             "A bag's frames are counted", where=path, expected="0, 1, ...", found=request.index
