@@ -60,7 +60,8 @@ class KinConfig:
     `aside_directions`, in `aside_steps` lengths between those of `aside`, metres. Coefficients have
     standard deviations, in halves of the box: `bend_round` where what is round stays round,
     `bend_even` where two sides that are alike stay alike, `bend_any` of all others; `bend_lean` :
-    radians; `bend_steepest` : of the bend's slopes, so that space does not fold.
+    radians; `bend_steepest` : of the bend's slopes, so that space does not fold. One of which a
+    share over `most_through` still stands `through` metres before what was measured is left out.
     Hypotheses: of the best `kept` fits the best `hypotheses` that lie `distinct` metres apart, at
     every `distinct_step`-th point. Their weight is a logistic function of the best score, a half at
     `convincing`, with the slope `sharpness`. Of a hollow shape, whose share of hollow space reaches
@@ -143,6 +144,8 @@ class KinConfig:
     bend_any: float = 0.03
     bend_lean: float = 0.1
     bend_steepest: float = share(0.6)
+    through: float = 0.01
+    most_through: float = share(0.05)
     out_pull: float = 5.0
     aside: tuple[float, float] = (0.001, 0.06)
     aside_steps: int = 14

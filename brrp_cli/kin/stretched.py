@@ -16,6 +16,7 @@ from brrp_cli.kin.bending import BentFit, BoxPoints, bent
 from brrp_cli.kin.evidence import Evidence
 from brrp_cli.kin.library import Library
 from brrp_cli.kin.placement import Placements
+from brrp_cli.kin.ways_out import seen_through
 from brrp_cli.prior.distance_field import quick_distance_field
 from brrp_cli.prior.parameters import FieldConfig
 from brrp_cli.prior.shape import StoredShape
@@ -26,13 +27,15 @@ Array = NDArray[np.float64]
 @dataclass(frozen=True)
 class BentShape:
     """A fit bent onto what was seen, and what speaks against it; u : (n, 3) vertices of the stored
-    shape in its box; faces : (m, 3); colours : (n, 3)"""
+    shape in its box; faces : (m, 3); colours : (n, 3); through : share of its surface that stands
+    before what was measured behind it"""
 
     fit: BentFit
     cost: float
     u: Array
     faces: NDArray[np.int32]
     colours: NDArray[np.uint8]
+    through: float = 0.0
 
     @property
     def T_plane_shape(self) -> Array:
@@ -78,7 +81,8 @@ def bent_shape(
     """A shape bent onto what was seen."""
     surface, normals = _sampled(shape.u, shape.faces, shape.fit.half, config.bend_points, rng)
     fit, cost = bent(shape.fit, surface, normals, evidence, config)
-    return replace(shape, fit=fit, cost=cost)
+    through = seen_through(fit.placed(BoxPoints(surface)), evidence, config.through)
+    return replace(shape, fit=fit, cost=cost, through=through)
 
 
 def _sampled(

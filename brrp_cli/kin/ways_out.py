@@ -34,6 +34,13 @@ def ways_out(points: Array, evidence: Evidence, config: KinConfig) -> tuple[Arra
     return np.maximum(amount, 0), way
 
 
+def seen_through(points: Array, evidence: Evidence, deeper: float) -> float:
+    """Share of points (n, 3), frame of the plane, that stand more than `deeper` metres before what
+    was measured behind them."""
+    seen: Array = np.asarray(transform_points(evidence.T_cam_plane, points), dtype=np.float64)
+    return float((_gap(seen, evidence) > deeper).mean())
+
+
 def _gap(points: Array, evidence: Evidence) -> Array:
     """Metres (n,) in front of what was measured; 0 where nothing tells, or behind it."""
     return np.maximum(np.nan_to_num(evidence.free_depth(points), nan=0.0), 0)

@@ -84,8 +84,12 @@ def kin_hypotheses(
         )
         for row, name in zip(chosen, names, strict=True)
     ]
-    cost = np.array([each.cost for each in found])
     together = shares[shares >= kin.least_share].sum()
+    kept = [k for k, each in enumerate(found) if each.through <= kin.most_through]
+    if not kept:
+        return []
+    chosen, names, found = chosen[kept], [names[k] for k in kept], [found[k] for k in kept]
+    cost = np.array([each.cost for each in found])
     hollow = library.hollow[fits.placements.stance[chosen]]
     relative = bent_shares(cost, hollow, into, kin)
     return [
