@@ -100,11 +100,14 @@ def mean_normals(across: Array, rows: NDArray[np.int64]) -> Array:
 def _oval(axis: Axis, points: Array, normals: Array, config: RevolutionConfig) -> float:
     """The axis of something oval is in its middle, and every normal nearly meets it. But its radius
     changes twice as fast as the turn: r (1 + e cos 2 (turn - first)) is wider by 2 e one way."""
-    outer = axis.normals_in_half_plane(points, normals)[:, 1] > config.aside
-    if outer.sum() < config.neighbours:
+    across = axis.normals_in_half_plane(points, normals)[:, 1]
+    # Of a wall, the side of which more is seen.
+    side = max((across > config.aside, across < -config.aside), key=np.count_nonzero)
+    if side.sum() < config.neighbours:
         return 0.0
-    height, radius = axis.half_plane(points[outer]).T
-    turn = np.arctan2(*(axis.radii(points[outer])[1] @ axis.sides.T).T)
+    points = points[side]
+    height, radius = axis.half_plane(points).T
+    turn = np.arctan2(*(axis.radii(points)[1] @ axis.sides.T).T)
     low, high = height.min(), height.max()
     level = np.rint((height - low) / max(high - low, 1e-9) * (config.levels - 1)).astype(np.int64)
     count = np.bincount(level)
@@ -112,17 +115,20 @@ def _oval(axis: Axis, points: Array, normals: Array, config: RevolutionConfig) -
     def beside_mean(values: Array) -> Array:
         return values - (np.bincount(level, values) / np.maximum(count, 1))[level]
 
-    relative = beside_mean(radius) / np.maximum(radius - beside_mean(radius), 1e-9)
+    mean = np.maximum(radius - beside_mean(radius), 1e-9)
+    relative = beside_mean(radius) / mean
+    # Noise is as high on a thin stem as on a wide bowl, and a larger share of its radius.
+    says = (mean / mean.max()) ** 2
     # An axis that is not quite in the middle shows once in a turn.
     waves = [wave(k * turn) for k in (1, 2) for wave in (np.cos, np.sin)]
     A = np.stack([beside_mean(each) for each in waves], axis=1)
-    weight, found = np.ones(len(A)), np.zeros(4)
+    weight, found = says, np.zeros(4)
     for _ in range(config.steps):
         weighed = A * weight[:, None]
         # Waves that what is seen of a turn does not tell apart count as none.
-        held = weighed.T @ A + UNTOLD * len(A) * np.eye(4)
+        held = weighed.T @ A + UNTOLD * says.sum() * np.eye(4)
         found = np.linalg.solve(held, weighed.T @ relative)
-        weight = 1 / (1 + ((relative - A @ found) / config.strays) ** 2)
+        weight = says / (1 + ((relative - A @ found) / config.strays) ** 2)
     return 2 * float(np.hypot(*found[2:]))
 
 

@@ -95,7 +95,7 @@ class RevolutionConfig:
     sectors: int = 36
     least_sector: float = share(0.005)
     least_covered: float = share(0.33)
-    most_scatter: float = 0.002
+    most_scatter: float = 0.0026
     within: float = share(0.9)
     leaning: float = 1.1
     most_oval: float = share(0.23)

@@ -100,3 +100,32 @@ def test_an_oval_bottle_is_told_from_a_round_one(axis):
     # (1 - 0.9) / 0.95, and (1 - 0.75) / 0.875
     assert found[0.9] == pytest.approx(0.105, abs=0.03)
     assert found[0.75] == pytest.approx(0.286, abs=0.09)
+
+
+def looked_into(squeezed=1.0):
+    """The inner side of a cone, as wide across as a share of what it is along x."""
+    points, normals = frustum(0.02, 0.05, 0.06, count=1500, seen=1.5 * np.pi)
+    points, normals = points * [1, squeezed, 1], normals / [1, squeezed, 1]
+    return points, -normals / np.linalg.norm(normals, axis=1, keepdims=True)
+
+
+def test_what_is_seen_of_the_inside_tells_an_oval_bowl_too():
+    for squeezed in (1.0, 0.9, 0.7):
+        points, normals = looked_into(squeezed)
+        upright = upright_axis(points, normals, UP, CONFIG.off, CONFIG.steps)
+        found = roundness_about(upright, points, normals, CONFIG).oval
+        # (1 - 0.9) / 0.95, and (1 - 0.7) / 0.85
+        assert found == pytest.approx((1 - squeezed) / ((1 + squeezed) / 2), abs=0.05), squeezed
+
+
+def test_the_thin_stem_of_a_glass_does_not_make_it_oval():
+    """Depth that is off by a millimetre is off by a quarter of its radius."""
+    rng = np.random.default_rng(0)
+    inner, inner_normals = looked_into()
+    stem, stem_normals = frustum(0.004, 0.004, 0.08, count=150)
+    points = np.concatenate([inner, stem - [0, 0, 0.08]])
+    normals = np.concatenate([inner_normals, stem_normals])
+    points += 0.001 * rng.standard_normal((len(points), 1)) * normals
+    axis = upright_axis(points, normals, UP, CONFIG.off, CONFIG.steps)
+    assert roundness_about(axis, points, normals, CONFIG).oval < 0.05
+    assert axis_of(points, normals, UP, CONFIG) is not None
