@@ -42,9 +42,9 @@ def at(column, z, row=40):
 @pytest.mark.parametrize(
     ("point", "least", "most", "why"),
     [
-        (at(60, 1.0), 0.0, 0.0, "on it"),
-        (at(60, 1.0015), 1.0, 1.0, "half a ramp behind it"),
-        (at(60, 1.0035), 2.33, 2.33, "at the end of the shell"),
+        (at(60, 1.0), 0.0, None, "on it"),
+        (at(60, 1.0015), 1.0, None, "half a ramp behind it"),
+        (at(60, 1.0035), 2.33, None, "at the end of the shell"),
         (at(60, 1.005), None, None, "behind the shell"),
         (at(60, 0.9985), -1.0, -1.0, "half a ramp in front of it"),
         (at(60, 0.99), None, -2.67, "far in front of it"),
