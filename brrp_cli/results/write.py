@@ -214,7 +214,8 @@ def _oriented_box(vertices: NDArray[np.floating]) -> dict[str, Any]:
     the frame of the vertices, and its extents along these axes, longest first, metres."""
     o3d = import_open3d()
     points = o3d.utility.Vector3dVector(np.ascontiguousarray(vertices, np.float64))
-    box = o3d.geometry.OrientedBoundingBox.create_from_points_minimal(points)
+    # `robust` for what is flat.
+    box = o3d.geometry.OrientedBoundingBox.create_from_points_minimal(points, robust=True)
     order = np.argsort(-np.asarray(box.extent), kind="stable")
     axes = np.asarray(box.R)[:, order]
     axes[:, 2] *= np.sign(np.linalg.det(axes))

@@ -22,3 +22,13 @@ def test_a_turned_box_gets_its_own_pose_back(seed):
     inside = transform_points(np.linalg.inv(T_frame_box), mesh.vertices)
     assert np.abs(inside).max(axis=0) == pytest.approx([0.1, 0.05, 0.025], abs=1e-9)
     assert abs(R[:, 0] @ T[:3, 1]) == pytest.approx(1, abs=1e-9)
+
+
+def test_what_is_flat_has_a_box_too():
+    corners = np.array(
+        [[0.0, 0, 0.5], [0.2, 0, 0.5], [0.2, 0.1, 0.5], [0, 0.1, 0.5], [0.1, 0, 0.5]]
+    )
+    found = _oriented_box(corners)
+    inside = transform_points(np.linalg.inv(found["T_frame_box"]), corners)
+    assert (np.abs(inside) <= np.array(found["extents"]) / 2 + 1e-6).all()
+    assert found["extents"][2] == pytest.approx(0, abs=1e-6)
