@@ -14,9 +14,6 @@ from brrp_cli.geometry import normalise
 
 Array = NDArray[np.float64]
 
-# Mean square of a wave along what is seen of a turn, below which that does not tell how high it is.
-UNTOLD = 1e-4
-
 
 @dataclass(frozen=True)
 class Roundness:
@@ -126,7 +123,7 @@ def _oval(axis: Axis, points: Array, normals: Array, config: RevolutionConfig) -
     for _ in range(config.steps):
         weighed = A * weight[:, None]
         # Waves that what is seen of a turn does not tell apart count as none.
-        held = weighed.T @ A + UNTOLD * says.sum() * np.eye(4)
+        held = weighed.T @ A + config.untold * says.sum() * np.eye(4)
         found = np.linalg.solve(held, weighed.T @ relative)
         weight = says / (1 + ((relative - A @ found) / config.strays) ** 2)
     return 2 * float(np.hypot(*found[2:]))

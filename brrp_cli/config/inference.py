@@ -75,7 +75,8 @@ class RevolutionConfig:
     most_scatter : metres within which a share `within` of the points lies of the `neighbours` that
         the turn brings beside them; `leaning` times as many count for an axis that leans
     most_oval : share of the radius by which it may be wider one way than across, over `levels` of
-        the height; radii that are off by a share `strays` lose half of their say
+        the height; radii that are off by a share `strays` lose half of their say; waves along what
+        is seen of a turn that have a mean square under `untold` count as none
     beside : metres from a seen point along the surface to where it tells where that lies
     patch : metres, of the half plane; points are one-sided if the mean direction from the axis, of
         those in three patches by three, is longer than `one_sided`
@@ -101,6 +102,7 @@ class RevolutionConfig:
     most_oval: float = share(0.23)
     levels: int = 24
     strays: float = share(0.05)
+    untold: float = 1e-4
     neighbours: int = 12
     beside: float = 0.003
     patch: float = 0.004

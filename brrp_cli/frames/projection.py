@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brrp_cli.frames.frame import Frame
+from brrp_cli.geometry import project
 
 
 def depth_behind(points: NDArray[np.floating], frame: Frame) -> NDArray[np.float64]:
@@ -32,12 +33,9 @@ def between_pixels(
     camera."""
     from scipy.ndimage import map_coordinates
 
-    z = points[:, 2]
     with np.errstate(all="ignore"):
-        u, v = (
-            np.where(z > 0, points[:, i] / z * frame.K[i, i] + frame.K[i, 2], -1.0)
-            for i in range(2)
-        )
+        # Behind the camera is outside of the image, and no coordinate is NaN.
+        u, v = np.where(points[:, 2:] > 0, project(points, frame.K), -1.0).T
     return np.asarray(map_coordinates(image, (v, u), np.float64, order=1, cval=np.nan))
 
 

@@ -82,6 +82,13 @@ def test_between_sure_pixels_and_others_the_nearest_one_counts():
     np.testing.assert_allclose(found, [0.002, 0.002, -0.998], atol=1e-6)
 
 
+def test_behind_the_camera_and_beside_the_image_nothing_was_seen():
+    frame = wall()
+    surface = SeenSurface(frame, OWN, np.ones(frame.shape, bool), 0.001)
+    points = np.array([[0.0, 0, -1], [0, 0, 0], at(-5, 1.0), at(150, 1.0), at(60, 1.0, row=-9)])
+    assert np.isnan(surface.behind(points)).all()
+
+
 def test_depth_at_a_jump_says_nothing_of_what_is_in_front():
     frame = wall()
     everywhere = np.ones(frame.shape, bool)
