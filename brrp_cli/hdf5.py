@@ -1,12 +1,12 @@
-"""HDF5 files that are made in memory and written by Python.
+"""What several files of HDF5 need.
 
-Where the HDF5 library writes itself, a full disk is a RuntimeError at best; at worst it keeps the
-file and fails again when the process ends.
+They are made in memory and written by Python: where the HDF5 library writes itself, a full disk is
+a RuntimeError at best; at worst it keeps the file and fails again when the process ends.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
@@ -26,6 +26,16 @@ def hdf5_bytes(fill: Callable[[h5py.File], None]) -> bytes:
         fill(file)
         file.flush()
         return bytes(file.id.get_file_image())
+
+
+def members(group: h5py.Group) -> Iterator[tuple[str, Any]]:
+    """Name and member of each member of `group`.
+
+    For comprehensions that may end with an error. h5py's own `items` and `values` hold the lock of
+    the whole library until their iterator is deleted, which a traceback that holds a comprehension
+    puts off. Until then any other thread waits that touches h5py, even to delete an object.
+    """
+    return ((name, group[name]) for name in group)
 
 
 class SharedParts:

@@ -4,6 +4,7 @@ import os
 from multiprocessing.forkserver import ensure_running
 
 import pytest
+from h5py._objects import phil
 
 from brrp_cli.executors import processes
 
@@ -55,3 +56,11 @@ def log_level_is_restored():
     yield
     for logger, level in LEVELS:
         logger.setLevel(level)
+
+
+@pytest.fixture(autouse=True)
+def h5py_is_not_locked():
+    """What a test leaves behind does not hold h5py's lock. Another thread that waits for it, as one
+    of a pool of processes may when it collects garbage, waits for ever."""
+    yield
+    assert not phil._is_owned()

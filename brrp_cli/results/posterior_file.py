@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from brrp_cli.errors import BrrpError
-from brrp_cli.hdf5 import SharedParts, hdf5_bytes
+from brrp_cli.hdf5 import SharedParts, hdf5_bytes, members
 from brrp_cli.reconstruction import StoredPosterior
 
 if TYPE_CHECKING:
@@ -62,7 +62,7 @@ def read_posteriors(
             shared = SharedParts(file["shared"])
             return {
                 int(name): _class_of(path, group, classes).read(group, shared)
-                for name, group in file["objects"].items()
+                for name, group in members(file["objects"])
             }
     except (OSError, KeyError, ValueError) as error:
         raise BrrpError(

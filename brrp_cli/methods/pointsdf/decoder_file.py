@@ -12,6 +12,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from brrp_cli.hdf5 import members
+
 if TYPE_CHECKING:
     import h5py
 
@@ -38,7 +40,7 @@ def read_decoder(group: h5py.Group) -> Decoder:
 
     try:
         decoder = Decoder(read_config(json.loads(group.attrs["network"])))
-        tensors = {name: torch.from_numpy(np.asarray(data)) for name, data in group.items()}
+        tensors = {name: torch.from_numpy(np.asarray(data)) for name, data in members(group)}
         for name, tensor in decoder.state_dict().items():
             if name.endswith("num_batches_tracked"):
                 tensors[name] = tensor
