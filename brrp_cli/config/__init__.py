@@ -23,7 +23,13 @@ from brrp_cli.config.inference import (
     VolumeConfig,
 )
 from brrp_cli.config.kin import KinConfig
-from brrp_cli.config.observation import FloorConfig, ObservationConfig, SensorConfig, StrayConfig
+from brrp_cli.config.observation import (
+    FlatteningConfig,
+    FloorConfig,
+    ObservationConfig,
+    SensorConfig,
+    StrayConfig,
+)
 from brrp_cli.config.registration import (
     ColourConfig,
     FeatureConfig,
@@ -48,6 +54,7 @@ __all__ = [
     "FeatureConfig",
     "FittedDepthConfig",
     "FittedMapConfig",
+    "FlatteningConfig",
     "FloorConfig",
     "HypothesesConfig",
     "InferenceConfig",
@@ -88,6 +95,7 @@ class HypothesesConfig:
     kin: KinConfig = field(default_factory=KinConfig)
     map: FittedMapConfig = field(default_factory=FittedMapConfig)
     sensor: SensorConfig = field(default_factory=SensorConfig)
+    flattening: FlatteningConfig = field(default_factory=FlatteningConfig)
 
 
 @dataclass(frozen=True)

@@ -176,6 +176,34 @@ class StrayConfig:
 
 
 @dataclass(frozen=True)
+class FlatteningConfig:
+    """Low things that a camera mixes with the table (observation/flattened.py).
+
+    low : metres over the plane, less than which the share `top` of a thing's pixels lie that is
+        mixed with it; table : metres from the plane, of the table's pixels
+    widths : pixels, standard deviations that are tried
+    around : pixels from a thing, of the table that shows whether it rises; beside : from and to
+        which its level is taken; clear : pixels from another thing that hides it
+    least_pixels : of a thing, and of the table around it and beside it
+    least_rise : share of a thing's height to which the table rises around it, where it may smooth
+    most_left : part of the table's rise that is left, at most, where it is that of smoothing
+    least_share : of its pixel's value that a thing is taken to have
+    """
+
+    low: float = 0.03
+    top: float = share(0.95)
+    table: float = 0.02
+    widths: tuple[float, ...] = (2.0, 3.0, 4.0, 5.0, 6.0, 8.0)
+    around: int = 10
+    beside: tuple[int, int] = (14, 26)
+    clear: int = 16
+    least_pixels: int = 50
+    least_rise: float = share(0.05)
+    most_left: float = share(0.6)
+    least_share: float = share(0.25)
+
+
+@dataclass(frozen=True)
 class SensorConfig:
     """How far measured depth errs: a standard deviation of noise + noise_growth * depth^2, metres.
 

@@ -45,7 +45,7 @@ def run(frame: Frame, setup: Setup) -> Reconstruction:
         infer: Callable[[int], ObjectReconstruction]
         if config.hypotheses is not None:
             scene = look_at(frame, setup, retriever)
-            image = scene.image
+            frame, image = scene.frame, scene.image
             sampled = sampled_scene(frame, config.observation, seed, image.plane)
             infer = stack.enter_context(by_hypotheses(scene, sampled, retriever, setup))
         else:
