@@ -6,6 +6,7 @@ import errno
 import os
 import tempfile
 import threading
+from contextlib import contextmanager
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -55,14 +56,21 @@ def common(prior, frame):
     return Common(scene, os.getpid())
 
 
-@pytest.fixture
-def helpers():
+@contextmanager
+def one_helper():
     found = started_later(METHODS["brrp"], 2, None)
     found.start()
     found.wait()
     assert found.any_ready
     yield found
     found.close()
+
+
+@pytest.fixture(scope="module")
+def helpers():
+    """For all tests that it outlives."""
+    with one_helper() as found:
+        yield found
 
 
 def test_who_is_free_does_it(common, helpers, frame):
@@ -83,8 +91,11 @@ def test_who_is_free_does_it(common, helpers, frame):
         assert do("work", 8)[0] is True
 
 
-def test_what_a_helper_dies_of_is_done_here(common, helpers):
-    with shared_work(for_helpers.here_or_there, common, common.scene, helpers) as do:
+def test_what_a_helper_dies_of_is_done_here(common):
+    with (
+        one_helper() as mortal,
+        shared_work(for_helpers.here_or_there, common, common.scene, mortal) as do,
+    ):
         assert do("die", 3)[:2] == (False, 3)
         assert do("work", 4)[:2] == (False, 4), "it is gone"
 
