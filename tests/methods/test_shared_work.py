@@ -13,9 +13,11 @@ from types import SimpleNamespace
 import for_helpers
 import pytest
 from for_helpers import Common
+from painted_retrieval import write_coarse
 from table_scene import box, in_camera, photograph, placed
 
-from brrp_cli import Reconstructor, open_prior
+from brrp_cli import Reconstructor, load_config, open_prior
+from brrp_cli.config import FeatureConfig
 from brrp_cli.errors import PriorError
 from brrp_cli.methods.registry import METHODS
 from brrp_cli.methods.shared_work import MOST, shared_work, started_later
@@ -32,7 +34,9 @@ def prior(tmp_path_factory):
     solids.cylinder(0.04, 0.12).export(meshes / "can.ply")
     out = tmp_path_factory.mktemp("prior") / "prior"
     looks = AppearanceConfig(views=8, rays=500)
-    parameters = BuildParameters(samples=1000, dense_points=5000, appearance=looks)
+    parameters = BuildParameters(
+        samples=1000, dense_points=5000, features=FeatureConfig(scales=(1.0,)), appearance=looks
+    )
     build_prior(meshes, out, parameters, workers=1)
     return open_prior(out)
 
@@ -134,11 +138,11 @@ def test_only_a_method_that_gains_by_it_has_helpers(method, workers, count):
     assert started_later(METHODS[method], workers, None).count == count
 
 
-def test_a_session_with_helpers_has_the_bytes_of_one_without(prior, frame):
-    bare = frame.without_masks()
+def test_a_session_with_helpers_has_the_bytes_of_one_without(prior, frame, tmp_path):
+    bare, config = frame.without_masks(), load_config(write_coarse(tmp_path))
     with (
-        Reconstructor(prior, workers=1) as alone,
-        Reconstructor(prior, workers=2) as session,
+        Reconstructor(prior, config=config, workers=1) as alone,
+        Reconstructor(prior, config=config, workers=2) as session,
     ):
         assert not session.helpers.any_ready
         for seen in (frame, frame, bare):
