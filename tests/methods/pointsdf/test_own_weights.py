@@ -43,8 +43,9 @@ def test_they_never_saw_what_evaluations_hold_back():
 def out(tmp_path_factory):
     folder = tmp_path_factory.mktemp("own")
     save_frame(photograph(THINGS), folder / "frame.npz")
+    (folder / "coarse.toml").write_text("[surface]\nspacing = 0.01\nnodes = 64_000\n")
     command = ["reconstruct", folder / "frame.npz", "--method", "pointsdf", "-o", folder / "out"]
-    result = CliRunner().invoke(main, [*map(str, command)])
+    result = CliRunner().invoke(main, [*map(str, command), "--config", str(folder / "coarse.toml")])
     assert result.exit_code == 0, result.output
     return folder / "out"
 
