@@ -2,6 +2,7 @@ import logging
 import multiprocessing
 import os
 from multiprocessing.forkserver import ensure_running
+from pathlib import Path
 
 import pytest
 from h5py._objects import phil
@@ -29,12 +30,13 @@ def workers_are_forked(no_clip_of_the_users):
     its own three seconds. Tests of the processes themselves, and commands that are run in a process
     of their own, start them as users do."""
     # What makes an object of a prior, and what measures one.
-    modules = ["open3d", "torch", "distributed", "brrp_cli.api", "brrp_cli.evaluation.run"]
-    modules += ["brrp_cli.prior.build.build"]
+    modules = ["loaded_libraries", "torch", "distributed", "brrp_cli.api"]
+    modules += ["brrp_cli.evaluation.run", "brrp_cli.prior.build.build"]
     multiprocessing.set_forkserver_preload(modules)
     with pytest.MonkeyPatch.context() as patch:
         # Where the package is installed, it is loaded from there and not from this folder.
         patch.setenv("PYTHONSAFEPATH", "1")
+        patch.setenv("PYTHONPATH", str(Path(__file__).with_name("support")), os.pathsep)
         # OpenMP's threads do not survive a fork: what waits for one then waits for ever.
         for name in processes.ONE_THREAD:
             patch.setenv(name, "1")

@@ -81,15 +81,24 @@ def with_ends(T: Array, more: Array, directions: Array, hidden: float) -> Array:
     found = np.empty((len(T) + 2 * np.sum(more > hidden), 4, 4))
     n = 0
     for b in range(len(T)):
-        found[n] = T[b]
+        _copy(T[b], found[n])
         n += 1
         if more[b] > hidden:
             for sense in (1, -1):
-                found[n] = T[b]
+                _copy(T[b], found[n])
                 for axis in range(2):
                     found[n, axis, 3] += sense * more[b] / 2 * directions[b, axis]
                 n += 1
     return found
+
+
+@compiled
+def _copy(given: Array, found: Array) -> None:
+    """Number by number: to compile `found[:] = given`, with its errors of shapes that differ, takes
+    three seconds."""
+    for i in range(given.shape[0]):
+        for j in range(given.shape[1]):
+            found[i, j] = given[i, j]
 
 
 @compiled

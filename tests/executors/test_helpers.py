@@ -14,7 +14,7 @@ import pytest
 
 from brrp_cli.errors import BrrpError, PriorError
 from brrp_cli.executors import helpers as module
-from brrp_cli.executors.helpers import MOST_LOST, Helpers, LostError
+from brrp_cli.executors.helpers import Helpers, LostError
 
 TESTS = Path(__file__).parents[1]
 
@@ -82,13 +82,14 @@ def test_ctrl_c_of_the_terminal_is_not_for_it(helpers):
     assert call(helpers, for_helpers.process) == pid
 
 
-def test_one_that_dies_is_replaced_but_not_for_ever():
+def test_one_that_dies_is_replaced_but_not_for_ever(monkeypatch):
+    monkeypatch.setattr(module, "MOST_LOST", 1)
     helpers = Helpers(1)
-    for lost in range(MOST_LOST + 2):
+    for lost in range(3):
         helpers.start()
         helpers.wait()
         with helpers.lent() as helper:
-            if lost > MOST_LOST:
+            if lost == 2:
                 assert helper is None
                 break
             with pytest.raises(LostError):

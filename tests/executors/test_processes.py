@@ -30,7 +30,7 @@ def act(what: str) -> str:
 
 def test_each_task_ends_alone_whatever_becomes_of_it() -> None:
     tasks = [(what,) for what in ("a", "die", "refuse", "b", "hang", "stumble", "threads", "c")]
-    results = dict(Processes(2).run(act, tasks, 5.0))
+    results = dict(Processes(2).run(act, tasks, 3.0))
     assert sorted(results) == list(range(8))
     assert [results[i] for i in (0, 3, 6, 7)] == ["A", "B", "1", "C"]
     assert "SIGSEGV" in str(results[1])

@@ -8,13 +8,13 @@ from functools import partial
 import numpy as np
 import pytest
 from click.testing import CliRunner
-from painted_scene import STRANGE, THINGS, photograph, write_things
+from painted_retrieval import painted_prior, write_coarse
+from painted_scene import STRANGE, THINGS, photograph
 from scipy.ndimage import binary_dilation
 
-from brrp_cli import Reconstructor
+from brrp_cli import Reconstructor, load_config
 from brrp_cli.api import reconstruct, try_masks
 from brrp_cli.cli import main
-from brrp_cli.config import preset
 from brrp_cli.config.mending import RegroupConfig
 from brrp_cli.config.registration import TrialConfig
 from brrp_cli.config.segmentation import SegmentConfig
@@ -25,9 +25,6 @@ from brrp_cli.mending.chosen import chosen
 from brrp_cli.mending.mend import mend
 from brrp_cli.mending.regroup import regroup
 from brrp_cli.mending.tries import Found, Tries
-from brrp_cli.prior.build.build import build_prior
-from brrp_cli.prior.parameters import BuildParameters
-from brrp_cli.prior.store import open_prior
 from brrp_cli.reconstruction import TOO_FEW_POINTS, Similar
 from brrp_cli.retrieval.appearance import AppearanceRetriever
 from brrp_cli.retrieval.base import one_image
@@ -42,10 +39,32 @@ ASIDE = 9
 
 @pytest.fixture(scope="module")
 def prior(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("painted")
-    parameters = BuildParameters(samples=400, surface_points=400, dense_points=4_000)
-    build_prior(write_things(folder / "meshes"), folder / "prior", parameters, workers=1)
-    return open_prior(folder / "prior")
+    return painted_prior(tmp_path_factory.mktemp("painted"))
+
+
+@pytest.fixture(scope="module")
+def config_file(tmp_path_factory):
+    return write_coarse(tmp_path_factory.mktemp("config"))
+
+
+@pytest.fixture(scope="module")
+def given(prior, config_file):
+    # One retriever, as in a command: what it saw of a mask counts for all frames of the image.
+    config = load_config(config_file)
+    retriever = AppearanceRetriever(prior, config, 0)
+    return {"prior": prior, "config": config, "retriever": retriever, "workers": 1}
+
+
+@pytest.fixture
+def options(prior, config_file):
+    """The same for the command."""
+    return ["--prior", prior.path, "--config", config_file, "--retriever", "appearance"]
+
+
+@pytest.fixture
+def begun(given):
+    """A new session, with what else is told it."""
+    return partial(Reconstructor, **{**given, "retriever": "appearance"})
 
 
 @pytest.fixture(scope="module")
@@ -69,14 +88,6 @@ def frame(truth):
 @pytest.fixture(scope="module")
 def aside(truth):
     return np.where(truth.segmap == 4, ASIDE, 0)
-
-
-@pytest.fixture(scope="module")
-def given(prior):
-    # One retriever, as in a command: what it saw of a mask counts for all frames of the image.
-    config = preset("default")
-    retriever = AppearanceRetriever(prior, config, 0)
-    return {"prior": prior, "config": config, "retriever": retriever, "workers": 1}
 
 
 @pytest.fixture(scope="module")
@@ -253,9 +264,9 @@ def test_only_masks_that_are_asked_about_are_tried(first, prior, again, frame):
     assert not any((mask & (frame.segmap != STRANGE_ID)).any() for mask in tried)
 
 
-def test_a_session_regroups_the_masks_that_it_makes(prior, truth):
+def test_a_session_regroups_the_masks_that_it_makes(begun, truth):
     """The same image without masks, by the same path as a user's."""
-    again = Reconstructor(prior, retriever="appearance", workers=1)
+    again = begun()
     frame = replace(truth, segmap=np.zeros_like(truth.segmap))
     result = again(frame)
     assert {"red_box", "red_can", "yellow_ball"} <= set(taken_for(result).values())
@@ -263,16 +274,15 @@ def test_a_session_regroups_the_masks_that_it_makes(prior, truth):
 
 
 def test_masks_that_were_made_before_are_mended_by_session_and_command(
-    prior, frame, aside, mended, tmp_path
+    begun, options, frame, aside, mended, tmp_path
 ):
     made, kept = frame.with_masks(frame.segmap, aside), frame
-    session = Reconstructor(prior, retriever="appearance", workers=1)
+    session = begun()
     assert np.array_equal(session(made).frame.segmap, mended.frame.segmap)
     assert np.array_equal(session(kept).frame.segmap, frame.segmap)
     for name, each, after in (("made", made, mended.frame), ("kept", kept, frame)):
         save_frame(each, tmp_path / f"{name}.npz")
-        options = ["--prior", prior.path, "--retriever", "appearance", "-o", tmp_path / name]
-        run = ["reconstruct", tmp_path / f"{name}.npz", *options]
+        run = ["reconstruct", tmp_path / f"{name}.npz", *options, "-o", tmp_path / name]
         result = CliRunner().invoke(main, list(map(str, run)))
         assert result.exit_code == 0, result.output
         stored = load_frame(tmp_path / name / "frame.npz")
@@ -281,8 +291,8 @@ def test_masks_that_were_made_before_are_mended_by_session_and_command(
         assert (tmp_path / f"{name}.masks.png").exists() == (name == "made")
 
 
-def test_what_was_corrected_stays_and_the_rest_is_mended(prior, frame, aside):
-    session = Reconstructor(prior, retriever="appearance", workers=1)
+def test_what_was_corrected_stays_and_the_rest_is_mended(begun, frame, aside):
+    session = begun()
     result = session(frame.with_masks(frame.segmap, aside, frozenset({BOTH})))
     assert np.array_equal(result.frame.segmap == BOTH, frame.segmap == BOTH)
     others = {taken for i, taken in taken_for(result).items() if i != BOTH}
@@ -294,12 +304,12 @@ def test_what_was_corrected_stays_and_the_rest_is_mended(prior, frame, aside):
 
 
 def test_a_mask_that_was_dropped_stays_away_and_the_rest_is_mended(
-    prior, frame, aside, mended, tmp_path
+    options, frame, aside, mended, tmp_path
 ):
     save_frame(frame.with_masks(frame.segmap, aside), tmp_path / "made.npz")
     drop = [tmp_path / "made.npz", "--drop", STRANGE_ID, "-o", tmp_path / "fixed.npz"]
-    options = ["--prior", prior.path, "--retriever", "appearance", "-o", tmp_path / "out"]
-    for run in (["segment", *drop], ["reconstruct", tmp_path / "fixed.npz", *options]):
+    fixed = [tmp_path / "fixed.npz", *options, "-o", tmp_path / "out"]
+    for run in (["segment", *drop], ["reconstruct", *fixed]):
         result = CliRunner().invoke(main, list(map(str, run)))
         assert result.exit_code == 0, result.output
     expected = mended.frame.segmap
@@ -307,8 +317,8 @@ def test_a_mask_that_was_dropped_stays_away_and_the_rest_is_mended(
     assert each_mask(found) == each_mask(np.where(expected == STRANGE_ID, 0, expected))
 
 
-def test_a_stream_mends_what_was_not_corrected_under_the_ids_of_its_tracks(prior, frame, aside):
-    session = Reconstructor(prior, retriever="appearance", workers=1, track=True)
+def test_a_stream_mends_what_was_not_corrected_under_the_ids_of_its_tracks(begun, frame, aside):
+    session = begun(track=True)
     session(frame.with_masks(np.where(frame.segmap == BOTH, 7, 0)))
     result = session(frame.with_masks(frame.segmap, aside, frozenset({BOTH})))
     assert np.array_equal(result.frame.segmap == 7, frame.segmap == BOTH)
@@ -328,9 +338,9 @@ def tried(monkeypatch):
     return numbers
 
 
-def test_what_was_mended_keeps_its_id_and_is_not_tried_again(prior, frame, aside, tried):
+def test_what_was_mended_keeps_its_id_and_is_not_tried_again(begun, frame, aside, tried):
     made = frame.with_masks(frame.segmap, aside)
-    with Reconstructor(prior, retriever="appearance", workers=1, track=True) as session:
+    with begun(track=True) as session:
         first = session(made)
         assert tried
         tried.clear()
@@ -342,13 +352,13 @@ def test_what_was_mended_keeps_its_id_and_is_not_tried_again(prior, frame, aside
     assert all(item.posterior is posteriors[item.object_id] for item in second.objects)
 
 
-def test_a_camera_that_hardly_moves_looks_into_no_mask_twice(prior, frame, aside, tried):
+def test_a_camera_that_hardly_moves_looks_into_no_mask_twice(begun, frame, aside, tried):
     nearer = np.eye(4)
     nearer[2, 3] = 0.01
     made = frame.with_masks(frame.segmap, aside)
     here = replace(made, T_world_cam=np.eye(4))
     there = replace(made, T_world_cam=nearer, points=(made.points - [0, 0, 0.01]).astype("f4"))
-    with Reconstructor(prior, retriever="appearance", workers=1, track=True) as session:
+    with begun(track=True) as session:
         first = session(here)
         tried.clear()
         second = session(there)

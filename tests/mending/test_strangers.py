@@ -6,16 +6,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from painted_scene import STRANGE, THINGS, photograph, write_things
+from painted_retrieval import painted_prior, write_coarse
+from painted_scene import STRANGE, THINGS, photograph
 
-from brrp_cli import Reconstructor
+from brrp_cli import Reconstructor, load_config
 from brrp_cli.api import try_masks
 from brrp_cli.config.segmentation import LeftOutConfig, SegmentConfig
 from brrp_cli.errors import FrameError
 from brrp_cli.mending.strangers import of_left_out, without_strangers
-from brrp_cli.prior.build.build import build_prior
-from brrp_cli.prior.parameters import BuildParameters
-from brrp_cli.prior.store import open_prior
 from brrp_cli.reconstruction import OK, ObjectReconstruction, Retrieved
 
 WHOLE, CUT, STRANGER = 1, 2, 3
@@ -27,12 +25,13 @@ SEGMENTATION = SegmentConfig(left_out=replace(LeftOutConfig(), tell=300))
 @pytest.fixture(scope="module")
 def given(tmp_path_factory):
     folder = tmp_path_factory.mktemp("cut")
-    parameters = BuildParameters(samples=400, surface_points=400, dense_points=4_000)
-    build_prior(write_things(folder / "meshes"), folder / "prior", parameters, workers=1)
-    prior = open_prior(folder / "prior")
     return {
-        "prior": prior, "retriever": "appearance", "workers": 1, "segmentation": SEGMENTATION
-    }  # fmt: skip
+        "prior": painted_prior(folder),
+        "config": load_config(write_coarse(folder)),
+        "retriever": "appearance",
+        "workers": 1,
+        "segmentation": SEGMENTATION,
+    }
 
 
 @pytest.fixture(scope="module")

@@ -6,15 +6,18 @@ import errno
 import os
 import tempfile
 import threading
+from contextlib import contextmanager
 from dataclasses import replace
 from types import SimpleNamespace
 
 import for_helpers
 import pytest
 from for_helpers import Common
+from painted_retrieval import write_coarse
 from table_scene import box, in_camera, photograph, placed
 
-from brrp_cli import Reconstructor, open_prior
+from brrp_cli import Reconstructor, load_config, open_prior
+from brrp_cli.config import FeatureConfig
 from brrp_cli.errors import PriorError
 from brrp_cli.methods.registry import METHODS
 from brrp_cli.methods.shared_work import MOST, shared_work, started_later
@@ -31,7 +34,9 @@ def prior(tmp_path_factory):
     solids.cylinder(0.04, 0.12).export(meshes / "can.ply")
     out = tmp_path_factory.mktemp("prior") / "prior"
     looks = AppearanceConfig(views=8, rays=500)
-    parameters = BuildParameters(samples=1000, dense_points=5000, appearance=looks)
+    parameters = BuildParameters(
+        samples=1000, dense_points=5000, features=FeatureConfig(scales=(1.0,)), appearance=looks
+    )
     build_prior(meshes, out, parameters, workers=1)
     return open_prior(out)
 
@@ -55,14 +60,21 @@ def common(prior, frame):
     return Common(scene, os.getpid())
 
 
-@pytest.fixture
-def helpers():
+@contextmanager
+def one_helper():
     found = started_later(METHODS["brrp"], 2, None)
     found.start()
     found.wait()
     assert found.any_ready
     yield found
     found.close()
+
+
+@pytest.fixture(scope="module")
+def helpers():
+    """For all tests that it outlives."""
+    with one_helper() as found:
+        yield found
 
 
 def test_who_is_free_does_it(common, helpers, frame):
@@ -83,8 +95,11 @@ def test_who_is_free_does_it(common, helpers, frame):
         assert do("work", 8)[0] is True
 
 
-def test_what_a_helper_dies_of_is_done_here(common, helpers):
-    with shared_work(for_helpers.here_or_there, common, common.scene, helpers) as do:
+def test_what_a_helper_dies_of_is_done_here(common):
+    with (
+        one_helper() as mortal,
+        shared_work(for_helpers.here_or_there, common, common.scene, mortal) as do,
+    ):
         assert do("die", 3)[:2] == (False, 3)
         assert do("work", 4)[:2] == (False, 4), "it is gone"
 
@@ -123,11 +138,11 @@ def test_only_a_method_that_gains_by_it_has_helpers(method, workers, count):
     assert started_later(METHODS[method], workers, None).count == count
 
 
-def test_a_session_with_helpers_has_the_bytes_of_one_without(prior, frame):
-    bare = frame.without_masks()
+def test_a_session_with_helpers_has_the_bytes_of_one_without(prior, frame, tmp_path):
+    bare, config = frame.without_masks(), load_config(write_coarse(tmp_path))
     with (
-        Reconstructor(prior, workers=1) as alone,
-        Reconstructor(prior, workers=2) as session,
+        Reconstructor(prior, config=config, workers=1) as alone,
+        Reconstructor(prior, config=config, workers=2) as session,
     ):
         assert not session.helpers.any_ready
         for seen in (frame, frame, bare):

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import shutil
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 import trimesh
@@ -96,6 +99,20 @@ def write_made_result(
 
     unmasked : what has no mask, camera frame
     """
+    if unmasked is None:
+        return Path(shutil.copytree(Path(_plain(frame).name) / "out", folder))
+    return _written(folder, frame, unmasked)
+
+
+@cache
+def _plain(frame: str) -> TemporaryDirectory[str]:
+    """What most tests want, written once in each process."""
+    kept = TemporaryDirectory(prefix="brrp_made_")
+    _written(Path(kept.name) / "out", frame, None)
+    return kept
+
+
+def _written(folder: Path, frame: str, unmasked: trimesh.Trimesh | None) -> Path:
     meshes = truth()
     seen = photograph(meshes if unmasked is None else meshes | {UNMASKED: unmasked})
     segmap = np.where(seen.segmap == UNMASKED, 0, seen.segmap)

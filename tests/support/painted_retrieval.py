@@ -25,6 +25,27 @@ ONE_BY_ONE = {
 }
 
 
+# Of a reconstruction where what is recognised matters, and little is asked of the meshes.
+COARSE = """
+[features]
+scales = [1.0]
+[hypotheses.mean]
+nodes = 20_000
+[hypotheses.map]
+hinges = 200
+steps = 5
+[surface]
+nodes = 20_000
+"""
+
+
+def write_coarse(folder: Path) -> Path:
+    """A file of `COARSE`."""
+    path = folder / "coarse.toml"
+    path.write_text(COARSE)
+    return path
+
+
 def painted_prior(folder: Path) -> Prior:
     parameters = BuildParameters(
         samples=400,

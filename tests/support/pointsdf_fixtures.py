@@ -16,7 +16,7 @@ from training.examples import Examples, Recipe, scene_examples
 from brrp_cli.ground_truth.scenes import Scene, find_scenes
 
 # By heart, and enough to give each of them a surface.
-STEPS, FEW_STEPS, RATE = 350, 60, 1e-2
+STEPS, FEW_STEPS, RATE = 350, 30, 1e-2
 
 
 @dataclass(frozen=True)

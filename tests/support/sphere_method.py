@@ -22,9 +22,12 @@ from brrp_cli.reconstruction import METRES, OK, ObjectReconstruction, Reconstruc
 @dataclass(frozen=True)
 class SphereConfig:
     """width : metres over which occupancy falls; the ball reaches `share` of the way from the
-    middle of what was seen to its farthest point."""
+    middle of what was seen to its farthest point. Its mesh is coarse: the smallest box around a
+    fine ball takes longer than all the rest."""
 
-    surface: SurfaceConfig = field(default_factory=lambda: SurfaceConfig(keep_distance=0.1))
+    surface: SurfaceConfig = field(
+        default_factory=lambda: SurfaceConfig(keep_distance=0.1, spacing=0.01, nodes=20_000)
+    )
     width: float = 0.004
     share: float = 1.0
 

@@ -12,6 +12,7 @@ from tabletop.held_out import held_out_names
 
 from brrp_cli import reconstruct
 from brrp_cli.cli import main
+from brrp_cli.config import PointSDFConfig
 from brrp_cli.evaluation.request import Request, named_weights
 from brrp_cli.frames.npz import save_frame
 from brrp_cli.ground_truth.metrics import f_score, sample_surface
@@ -42,8 +43,9 @@ def test_they_never_saw_what_evaluations_hold_back():
 def out(tmp_path_factory):
     folder = tmp_path_factory.mktemp("own")
     save_frame(photograph(THINGS), folder / "frame.npz")
+    (folder / "coarse.toml").write_text("[surface]\nspacing = 0.01\nnodes = 64_000\n")
     command = ["reconstruct", folder / "frame.npz", "--method", "pointsdf", "-o", folder / "out"]
-    result = CliRunner().invoke(main, [*map(str, command)])
+    result = CliRunner().invoke(main, [*map(str, command), "--config", str(folder / "coarse.toml")])
     assert result.exit_code == 0, result.output
     return folder / "out"
 
@@ -60,12 +62,14 @@ def test_a_box_and_a_can_are_solids_of_about_their_size_where_they_stand(out, ob
 
 
 def test_a_pixel_far_behind_an_object_moves_nothing():
-    frame = photograph(THINGS)
+    frame = photograph({1: THINGS[1]})
     rows, columns = np.nonzero(frame.segmap == 1)
     points = frame.points.copy()
     points[rows[0], columns[0]] *= 3
+    config = PointSDFConfig()
+    config = replace(config, surface=replace(config.surface, spacing=0.01, nodes=64_000))
     found, expected = (
-        reconstruct(f, method="pointsdf").objects[0].surface.as_trimesh()
+        reconstruct(f, method="pointsdf", config=config).objects[0].surface.as_trimesh()
         for f in (replace(frame, points=points), frame)
     )
     np.testing.assert_allclose(found.bounds, expected.bounds, atol=0.004)

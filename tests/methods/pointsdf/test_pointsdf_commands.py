@@ -20,6 +20,7 @@ from brrp_cli.methods.pointsdf.weights import load_weights, save_weights
 from brrp_cli.methods.registry import METHODS
 
 TWO = [4, 8]
+BOX = [4]
 
 
 def run(*arguments):
@@ -97,15 +98,15 @@ def test_a_trained_method_that_brings_no_weights_needs_some(trained, monkeypatch
     assert [each.weights for each in expand(["pointsdf"], [], [], [], [0])] == [None]
 
 
-def write_two(trained, folder):
-    """The first scene with a box and a tub alone."""
+def write_some(trained, folder, ids):
+    """The first scene with some of its objects alone."""
     scene = trained.scenes[0]
     frame = scene.view(0)
     folder.mkdir()
-    masks = np.where(np.isin(frame.segmap, TWO), frame.segmap, 0)
+    masks = np.where(np.isin(frame.segmap, ids), frame.segmap, 0)
     save_frame(replace(frame, segmap=masks), folder / "0.npz")
     truth = json.loads((trained.folder / "scenes" / "0.truth.json").read_text())
-    kept = [entry for entry in truth if entry["id"] in TWO]
+    kept = [entry for entry in truth if entry["id"] in ids]
     (folder / "0.truth.json").write_text(json.dumps(kept))
 
 
@@ -113,7 +114,7 @@ def write_two(trained, folder):
 def report(learnt, tmp_path_factory):
     """Two trainings side by side: the same weights by two names."""
     folder = tmp_path_factory.mktemp("report")
-    write_two(learnt, folder / "scenes")
+    write_some(learnt, folder / "scenes", TWO)
     shutil.copy(learnt.weights, folder / "twin.safetensors")
     weights = f"{learnt.weights},{folder / 'twin.safetensors'}"
     chosen = ["--method", "pointsdf", "--weights", weights, "--shift-masks", "0,2"]
@@ -174,13 +175,16 @@ def test_two_weights_of_one_name_are_refused(trained, tmp_path):
 
 
 def test_an_evaluation_without_weights_takes_the_methods_own(trained, tmp_path):
-    write_two(trained, tmp_path / "scenes")
+    write_some(trained, tmp_path / "scenes", BOX)
+    # The network that is shipped takes its time: fewer points are asked of it.
+    few = 'method = "pointsdf"\nhalf_width = 0.12\n[surface]\nspacing = 0.02\nnodes = 8000\n'
+    (tmp_path / "few.toml").write_text(few)
     command = ["eval", tmp_path / "scenes", "--data-root", trained.folder, "--method", "pointsdf"]
-    result = run(*command, "-o", tmp_path / "out", "--workers", "1")
+    options = ["--config", tmp_path / "few.toml", "--workers", "1"]
+    result = run(*command, *options, "-o", tmp_path / "out")
     assert result.exit_code == 0, result.output
     with (tmp_path / "out" / "metrics.csv").open(newline="") as stream:
         rows = list(csv.DictReader(stream))
-    assert [row["status"] for row in rows] == ["ok", "ok"]
-    assert {row["weights"] for row in rows} == {"tabletop"}
+    assert [(row["status"], row["weights"]) for row in rows] == [("ok", "tabletop")]
     told = json.loads((tmp_path / "out" / "summary.json").read_text())
     assert told["trained"]["tabletop"]["scenes"] == 300

@@ -73,6 +73,8 @@ def test_a_cluster_makes_the_same_bytes_while_its_workers_are_killed(
     monkeypatch.setattr(Cluster, "run", murderous)
     # Dask gives both up before they can be back: others must take their places.
     monkeypatch.setattr(cluster, "RESTART", "0.1s")
+    # One may have died with its result.
+    monkeypatch.setattr(cluster, "FETCH", 1.0)
     report = build_prior(boxes, tmp_path / "prior", TINY, scheduler="local:2")
     assert len(set(killed)) == 2
     assert report.made == NAMES and [failure.name for failure in report.manifest.failed] == ["bad"]
