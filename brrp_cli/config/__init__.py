@@ -26,6 +26,7 @@ from brrp_cli.config.kin import KinConfig
 from brrp_cli.config.observation import (
     FlatteningConfig,
     FloorConfig,
+    MixedEdgesConfig,
     ObservationConfig,
     SensorConfig,
     StrayConfig,
@@ -61,6 +62,7 @@ __all__ = [
     "KinConfig",
     "LikelihoodConfig",
     "MeanConfig",
+    "MixedEdgesConfig",
     "ObservationConfig",
     "PointSDFConfig",
     "RampConfig",
@@ -96,6 +98,7 @@ class HypothesesConfig:
     map: FittedMapConfig = field(default_factory=FittedMapConfig)
     sensor: SensorConfig = field(default_factory=SensorConfig)
     flattening: FlatteningConfig = field(default_factory=FlatteningConfig)
+    mixed_edges: MixedEdgesConfig = field(default_factory=MixedEdgesConfig)
 
 
 @dataclass(frozen=True)

@@ -204,6 +204,34 @@ class FlatteningConfig:
 
 
 @dataclass(frozen=True)
+class MixedEdgesConfig:
+    """Outlines at which a camera mixes the depths of both sides (observation/mixed_edges.py).
+
+    jump : metres of depth behind which it does, at least; far : the same of the background that
+        shows whether it does
+    most : pixels over which it may mix, at most: what lies further within is the object's own;
+        reach : pixels from what is told to what tells it
+    flying : share of the way to what is behind, from which on depth is between the two, if it is
+        more than `slope` times as deep as pixels are wide, as no face is that is well seen
+    share : of the pixels at one distance from outlines that are flying where the camera mixes, and
+        of those next to half of the objects' sides
+    least_pixels : well within an object; least_side : next to the outline on one of its sides;
+        least_sides : that have as many
+    """
+
+    jump: float = 0.02
+    far: float = 0.03
+    most: int = between(3, 1, 20)
+    reach: int = 12
+    flying: float = share(0.2)
+    slope: float = 4.0
+    share: float = share(0.08)
+    least_side: int = 8
+    least_sides: int = 3
+    least_pixels: int = 50
+
+
+@dataclass(frozen=True)
 class SensorConfig:
     """How far measured depth errs: a standard deviation of noise + noise_growth * depth^2, metres.
 

@@ -44,6 +44,7 @@ def reconstruct_by_hypotheses(
     = there is no stream; trial : nothing is inferred, only told which stored objects lie there
     """
     frame, image, seed = scene.frame, scene.image, scene.seed
+    clear = scene.clear
     hypotheses = _hypotheses(scene, trial)
     object_id = observation.object_id
     verifier = Verifier(_shuffled(observation.points, seed, object_id), frame, image.plane)
@@ -77,8 +78,8 @@ def reconstruct_by_hypotheses(
         like: list[KinHypothesis] = []
         if found.unknown >= hypotheses.kin.least_unknown:
             like = kin_hypotheses(
-                observation.points,
-                frame,
+                clear.object_points(object_id),
+                clear,
                 object_id,
                 image.plane,
                 scene.prior,
@@ -90,7 +91,7 @@ def reconstruct_by_hypotheses(
 
     @cache
     def shown() -> Shown:
-        surface = seen_surface(frame, object_id, image.plane, image.noise, hypotheses.mean.ramp)
+        surface = seen_surface(clear, object_id, image.plane, image.noise, hypotheses.mean.ramp)
         cell = scene.config.observation.surface_cell
         return shown_of(surface, observation, image.plane, cell, hypotheses)
 

@@ -16,7 +16,6 @@ from brrp_cli.methods.brrp_default import reconstruct_by_hypotheses
 from brrp_cli.methods.each_object import guarded, too_few
 from brrp_cli.methods.scene import Scene, look_at
 from brrp_cli.methods.shared_work import shared_work
-from brrp_cli.observation.flattened import raised
 from brrp_cli.observation.ray_samples import without_samples
 from brrp_cli.observation.strays import without_strays
 from brrp_cli.reconstruction import OK, ObjectReconstruction
@@ -73,8 +72,7 @@ def _tried_frame(tries: _Tries, number: int) -> Frame:
     assert hypotheses is not None
     segmap = np.where(tries.trial.masks[number], tried_id, measured.segmap)
     frame = without_strays(measured.with_masks(segmap), scene.config.strays, (), [tried_id])
-    image = scene.image
-    return raised(frame, image.plane, image.smoothing, hypotheses.flattening, tried_id)
+    return scene.image.mended(frame, hypotheses, tried_id)
 
 
 def _tried(

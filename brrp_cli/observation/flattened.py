@@ -40,6 +40,16 @@ def smoothing_width(frame: Frame, plane: Plane | None, config: FlatteningConfig)
     return float(config.widths[best]) if left[best] < config.most_left * rise else 0.0
 
 
+def low_things(frame: Frame, plane: Plane | None, config: FlatteningConfig) -> list[int]:
+    """Ids of the things that a camera may mix with the table."""
+    if plane is None:
+        return []
+    height = plane.signed_distance(frame.points)
+    return [
+        i for i in frame.object_ids if _is_low(height[(frame.segmap == i) & frame.valid], config)
+    ]
+
+
 def raised(
     frame: Frame,
     plane: Plane | None,
