@@ -45,7 +45,7 @@ def try_masks(frame: Frame, setup: Setup, trial: Trial) -> list[ObjectReconstruc
     retriever = CheckedRetriever(setup.retriever, len(prior.names))
     frame = without_strays(frame, config.strays, ())
     # A mask that is tried takes little from the background, if anything.
-    scene = look_at(frame, setup, retriever)
+    scene = look_at(frame, setup, retriever, shapes=False)
     sent = retriever if sendable(setup.retriever) else None
     tries = _Tries(scene, trial, int(frame.segmap.max()) + 1, sent)
 

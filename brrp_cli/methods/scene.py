@@ -63,8 +63,8 @@ class Scene:
     device: str
 
 
-def look_at(frame: Frame, setup: Setup, retriever: Retriever) -> Scene:
-    """The scene of a frame."""
+def look_at(frame: Frame, setup: Setup, retriever: Retriever, shapes: bool = True) -> Scene:
+    """The scene of a frame. shapes : whether shapes are to be made of what it shows"""
     config, prior = setup.config, setup.prior
     assert isinstance(config, Config) and config.hypotheses is not None and prior is not None
     hypotheses, measured, image = config.hypotheses, frame, setup.image
@@ -75,7 +75,7 @@ def look_at(frame: Frame, setup: Setup, retriever: Retriever) -> Scene:
     return Scene(
         measured,
         frame,
-        image.clear(frame, hypotheses),
+        image.clear(frame, hypotheses) if shapes else frame,
         image,
         prior,
         config,

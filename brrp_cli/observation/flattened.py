@@ -121,10 +121,7 @@ def _low_things(
     """The things of which `config.top` lies lower than `config.low`."""
     if plane is None:
         return
-    height = plane.signed_distance(frame.points)
-    low = [
-        i for i in frame.object_ids if _is_low(height[(frame.segmap == i) & frame.valid], config)
-    ]
+    height, low = plane.signed_distance(frame.points), low_things(frame, plane, config)
     margin = config.beside[1] + config.clear
     for object_id in low if only is None else [i for i in low if i == only]:
         box = mask_box(frame.segmap == object_id, margin)
