@@ -193,13 +193,13 @@ class FlatteningConfig:
     low: float = 0.03
     top: float = share(0.95)
     table: float = 0.02
-    widths: tuple[float, ...] = (2.0, 3.0, 4.0, 5.0, 6.0, 8.0)
+    widths: tuple[float, ...] = (3.0, 4.0, 5.0, 6.0, 8.0)
     around: int = 10
     beside: tuple[int, int] = (14, 26)
     clear: int = 16
     least_pixels: int = 50
     least_rise: float = share(0.05)
-    most_left: float = share(0.6)
+    most_left: float = share(0.8)
     least_share: float = share(0.25)
 
 
