@@ -18,5 +18,7 @@ bash tools/check_wheel.sh .venv-test
 # `pytest`, not `python -m pytest`: the installed package is tested, not the checkout.
 # It ends with 1 where a test fails and with 5 where none ran.
 export OMP_NUM_THREADS=1
-# A file's tests go to one worker, so that what they share is made once.
-"$bin/pytest" -n 2 --dist loadfile "$@"
+# A file's tests go to one worker, so that what they share is made once. A test that hangs tells
+# where it does and ends its worker; in another one it would hang as well.
+hang=(-o faulthandler_timeout=400 -o faulthandler_exit_on_timeout=true --max-worker-restart 0)
+"$bin/pytest" -n 2 --dist loadfile "${hang[@]}" "$@"
