@@ -186,8 +186,8 @@ class FlatteningConfig:
         which its level is taken; clear : pixels from another thing that hides it
     least_pixels : of a thing, and of the table around it and beside it
     least_rise : share of a thing's height to which the table rises around it, where it may smooth
-    most_left : part of the table's rise that is left, at most, where it is that of smoothing
-    least_share : of its pixel's value that a thing is taken to have
+    most_left : part of the table's rise that smoothing leaves unexplained, at most
+    least_share : of its pixels' values that a thing is taken to make, at least
     """
 
     low: float = 0.03
