@@ -1,6 +1,6 @@
 """How far is depth of objects off, as it was measured and as it is used?
 
-    python tools/measure_depth.py SCENES... [--data-root DATA] [--count N]
+    python tools/measure_depth.py SCENES... [--data-root DATA] [--scenes N]
 
 For each set of scenes, in the first view of each, with true masks; depth is held against rays that
 are cast into the true meshes. Numbers in millimetres are means of absolute errors, over objects or
@@ -28,12 +28,11 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from one_message import one_message
 
 from brrp_cli.config import HypothesesConfig, preset
+from brrp_cli.errors import BrrpError
 from brrp_cli.frames.frame import Frame
 from brrp_cli.ground_truth.scenes import Scene, find_scenes
 from brrp_cli.ground_truth.truth import true_mesh_in_camera
-from brrp_cli.observation.flattened import low_things, raised, smoothing_width
-from brrp_cli.observation.mixed_edges import mixing_width, without_mixed
-from brrp_cli.observation.ray_samples import scene_plane
+from brrp_cli.methods.scene import image_of
 from brrp_cli.observation.strays import without_strays
 from brrp_cli.raycast import look
 
@@ -72,15 +71,13 @@ def add(errors: Errors, scene: Scene, data_root: Path | None) -> None:
     hypotheses = CONFIG.hypotheses
     assert isinstance(hypotheses, HypothesesConfig)
     frame = without_strays(scene.view(0), CONFIG.strays)
-    plane = scene_plane(frame, CONFIG.observation, 0)
-    smooths = smoothing_width(frame, plane, hypotheses.flattening)
-    mixes = mixing_width(frame, hypotheses.mixed_edges)
-    mended = raised(frame, plane, smooths, hypotheses.flattening)
-    low = low_things(frame, plane, hypotheses.flattening) if smooths else []
-    high = [i for i in frame.object_ids if i not in low]
-    left = frame.valid & ~without_mixed(mended, mixes, hypotheses.mixed_edges, high).valid
-    errors.smooths.append(smooths)
-    errors.mixes.append(mixes)
+    if frame.T_world_cam is None:
+        raise BrrpError("A view has no pose", where=scene.folder)
+    image = image_of(frame, hypotheses, CONFIG.observation, 0)
+    mended = image.mended(frame, hypotheses)
+    left = frame.valid & ~image.clear(mended, hypotheses).valid
+    errors.smooths.append(image.smoothing)
+    errors.mixes.append(image.mixing)
     meshes = [true_mesh_in_camera(each, data_root, frame.T_world_cam) for each in scene.objects]
     sight = look(meshes, frame.K, frame.shape)
     for number, each in enumerate(scene.objects):
@@ -110,19 +107,19 @@ def _mean(metres: list[float] | NDArray[np.floating]) -> str:
 
 @one_message()
 def main() -> None:
-    """Parse the command line and print the table."""
+    """See the top of the file."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("scenes", type=Path, nargs="+")
+    parser.add_argument("sets", nargs="+", type=Path, metavar="SCENES")
     parser.add_argument("--data-root", type=Path)
-    parser.add_argument("--count", type=int, help="scenes of each set, at most")
+    parser.add_argument("--scenes", type=int, default=None, help="of each set, the first N")
     given = parser.parse_args()
     print("| | smooths, px | low: off before, after | mixes, px | outlines: off, the rest |")
     print("| --- | --- | --- | --- | --- |")
-    for folder in given.scenes:
+    for folder in given.sets:
         errors = Errors()
-        for scene in find_scenes(folder)[: given.count]:
+        for scene in find_scenes(folder)[: given.scenes]:
             add(errors, scene, given.data_root)
         print(errors.row(folder.name), flush=True)
 

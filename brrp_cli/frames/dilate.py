@@ -1,4 +1,5 @@
-"""Masks grown or opened by a few pixels, at the cost of the mask and not of the image."""
+"""Masks grown or opened by a few pixels, at the cost of the mask and not of the image, and how far
+pixels lie from one."""
 
 from __future__ import annotations
 
@@ -19,6 +20,15 @@ def mask_box(mask: Mask, margin: int) -> tuple[slice, slice]:
         slice(max(a - margin, 0), b + margin + 1) for a, b in zip(low, high, strict=True)
     )
     return by_row, by_column
+
+
+def distance_to(mask: Mask) -> NDArray[np.float64]:
+    """(h, w) pixels to the nearest pixel of a mask (h, w); infinite where it is empty."""
+    from scipy.ndimage import distance_transform_edt
+
+    if not mask.any():
+        return np.full(mask.shape, np.inf)
+    return np.asarray(distance_transform_edt(~mask))
 
 
 def dilated(mask: Mask, pixels: int) -> Mask:

@@ -43,8 +43,7 @@ def reconstruct_by_hypotheses(
     probabilities : P(c|R) (n,); earlier : views of the object in the stream's earlier frames; None
     = there is no stream; trial : nothing is inferred, only told which stored objects lie there
     """
-    frame, image, seed = scene.frame, scene.image, scene.seed
-    clear = scene.clear
+    frame, clear, image, seed = scene.frame, scene.clear, scene.image, scene.seed
     hypotheses = _hypotheses(scene, trial)
     object_id = observation.object_id
     verifier = Verifier(_shuffled(observation.points, seed, object_id), frame, image.plane)

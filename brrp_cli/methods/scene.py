@@ -39,7 +39,8 @@ class Image:
         return raised(frame, self.plane, self.smoothing, config.flattening, only)
 
     def clear(self, mended: Frame, config: HypothesesConfig) -> Frame:
-        """The same without depth that is mixed at outlines. Things that were raised keep theirs."""
+        """The same without depth that is mixed at outlines; where low things are raised, not of
+        them."""
         low = low_things(mended, self.plane, config.flattening) if self.smoothing else []
         high = [i for i in mended.object_ids if i not in low]
         return without_mixed(mended, self.mixing, config.mixed_edges, high)
@@ -69,7 +70,7 @@ def look_at(frame: Frame, setup: Setup, retriever: Retriever, shapes: bool = Tru
     assert isinstance(config, Config) and config.hypotheses is not None and prior is not None
     hypotheses, measured, image = config.hypotheses, frame, setup.image
     if image is None:
-        image = _image(measured, hypotheses, config.observation, setup.seed)
+        image = image_of(measured, hypotheses, config.observation, setup.seed)
     assert isinstance(image, Image)
     frame = image.mended(measured, hypotheses)
     return Scene(
@@ -85,9 +86,10 @@ def look_at(frame: Frame, setup: Setup, retriever: Retriever, shapes: bool = Tru
     )
 
 
-def _image(
+def image_of(
     measured: Frame, hypotheses: HypothesesConfig, observation: ObservationConfig, seed: int
 ) -> Image:
+    """What a frame without strays shows."""
     sensor = hypotheses.sensor
     plane = scene_plane(measured, observation, seed)
     smoothing = smoothing_width(measured, plane, hypotheses.flattening)

@@ -1,9 +1,9 @@
 """Low things on a table, as a camera measures them that smooths its depth.
 
 Active stereo matches windows and filters what it found, over steps of less than a pixel of
-disparity too. So it mixes a thing of up to a few centimetres with the table around it: a knife of
-one centimetre measures six millimetres, and the table rises towards it. Over how many pixels it
-smooths is read off that rise: what the table rises by is what the thing lacks.
+disparity too. So it mixes a thing of up to a few centimetres with the table around it: a knife
+measures too low, and the table rises towards it. Over how many pixels it smooths is read off that
+rise: what the table rises by is what the thing lacks.
 
 Smoothing is linear in inverse depth. Where a thing makes the share w of what its pixels are mixed
 of, its own inverse depth over the plane's is the measured one divided by w; that, smoothed in turn,
@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brrp_cli.config import FlatteningConfig
-from brrp_cli.frames.dilate import mask_box
+from brrp_cli.frames.dilate import distance_to, mask_box
 from brrp_cli.frames.frame import BACKGROUND, Frame
 from brrp_cli.observation.support_plane import Plane
 
@@ -153,12 +153,8 @@ def _inverse_of_plane(frame: Frame, plane: Plane, box: tuple[slice, slice]) -> A
 
 def _ring(thing: _LowThing, config: FlatteningConfig) -> _Ring | None:
     """None where too little of the table is seen around a thing, and further off."""
-    from scipy.ndimage import distance_transform_edt
-
-    off = distance_transform_edt(~thing.own)
-    alone, others = thing.table, thing.low | thing.others
-    if others.any():
-        alone = alone & (distance_transform_edt(~others) > config.clear)
+    off = distance_to(thing.own)
+    alone = thing.table & (distance_to(thing.low | thing.others) > config.clear)
     around = alone & (off <= config.around)
     beside = alone & (off > config.beside[0]) & (off <= config.beside[1])
     if min(np.count_nonzero(around), np.count_nonzero(beside)) < config.least_pixels:

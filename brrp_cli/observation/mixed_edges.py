@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brrp_cli.config import MixedEdgesConfig
-from brrp_cli.frames.dilate import mask_box, opened
+from brrp_cli.frames.dilate import distance_to, mask_box, opened
 from brrp_cli.frames.frame import BACKGROUND, Frame
 
 Array = NDArray[np.float64]
@@ -72,7 +72,7 @@ def without_mixed(frame: Frame, width: int, config: MixedEdgesConfig, ids: Itera
         return frame
     points = frame.points.copy()
     for outline in _outlines(frame, ids, config):
-        beside = _off(_jumps(outline, config)) <= width
+        beside = distance_to(_jumps(outline, config)) <= width
         thick = opened(outline.own, width)
         points[outline.box][outline.own & beside & thick] = np.nan
     return frame.with_points(points)
@@ -117,7 +117,7 @@ def _between(outline: _Outline, config: MixedEdgesConfig) -> Array:
     from scipy.ndimage import distance_transform_edt
 
     own, ids = outline.own, outline.ids
-    clear = (ids == BACKGROUND) & np.isfinite(outline.depth) & (_off(own) > config.most)
+    clear = (ids == BACKGROUND) & np.isfinite(outline.depth) & (distance_to(own) > config.most)
     if not clear.any():
         return np.full(own.shape, np.nan)
     off, nearest = distance_transform_edt(~clear, return_indices=True)
@@ -136,12 +136,3 @@ def _jumps(outline: _Outline, config: MixedEdgesConfig) -> Mask:
     with np.errstate(invalid="ignore"):
         near = outline.depth - outline.inner <= config.jump
     return ~outline.own & ~near
-
-
-def _off(mask: Mask) -> Array:
-    """(h, w) pixels to the nearest of a mask; infinite where it is empty."""
-    from scipy.ndimage import distance_transform_edt
-
-    if not mask.any():
-        return np.full(mask.shape, np.inf)
-    return np.asarray(distance_transform_edt(~mask))

@@ -57,7 +57,7 @@ def test_low_things_are_as_high_as_they_were_and_the_table_as_low():
     frame = smoothed(truth, 5.0)
     found = raised(frame, TABLE, smoothing_width(frame, TABLE, CONFIG), CONFIG)
     for i in LOW:
-        # Half of what is low was lost.
+        # A third of what is low was lost.
         assert height(frame, i) < 0.7 * height(truth, i)
         assert height(found, i) == pytest.approx(height(truth, i), rel=0.1)
     around = distance_transform_edt(~np.isin(truth.segmap, LOW)) < 10

@@ -15,19 +15,8 @@ from brrp_cli.ground_truth.scenes import find_scenes
 @pytest.fixture(scope="module")
 def made(tmp_path_factory):
     data = write_two(tmp_path_factory.mktemp("depth"))
-    options = [
-        "--scenes",
-        "1",
-        "--views",
-        "1",
-        "--size",
-        "640x480",
-        "--noise",
-        "none",
-        "--seed",
-        "2",
-    ]
-    result = generate(data, data / "scenes", *options)
+    options = "--scenes 1 --views 1 --size 640x480 --noise none --seed 2"
+    result = generate(data, data / "scenes", *options.split())
     assert result.exit_code == 0, result.output
     return data
 
