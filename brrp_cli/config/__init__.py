@@ -43,6 +43,7 @@ from brrp_cli.config.registration import (
     WeighConfig,
 )
 from brrp_cli.config.retrieval import RetrievalConfig
+from brrp_cli.config.seen_mask import SeenMaskConfig
 from brrp_cli.config.surface import SurfaceConfig
 from brrp_cli.errors import BrrpError
 
@@ -71,6 +72,7 @@ __all__ = [
     "RetrievalConfig",
     "RevolutionConfig",
     "SearchConfig",
+    "SeenMaskConfig",
     "SensorConfig",
     "StandingConfig",
     "StrayConfig",
@@ -89,6 +91,7 @@ class HypothesesConfig:
     """What takes the place of the scale scan and of the fixed grid of hinge points."""
 
     search: SearchConfig = field(default_factory=SearchConfig)
+    mask: SeenMaskConfig = field(default_factory=SeenMaskConfig)
     refine: RayRefinementConfig = field(default_factory=RayRefinementConfig)
     likelihood: LikelihoodConfig = field(default_factory=LikelihoodConfig)
     weigh: WeighConfig = field(default_factory=WeighConfig)

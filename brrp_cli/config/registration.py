@@ -55,45 +55,6 @@ class VerificationConfig:
 
 
 @dataclass(frozen=True)
-class MaskPosesConfig:
-    """How a model is placed by a mask alone (registration/mask_poses.py).
-
-    turns : about the plane's normal, of each resting pose; halved : times that the steps between
-        them are halved about the best; kept : how many of the best
-    directions : of the image, in which outlines are compared; points : of the model's surface;
-        steps : towards the mask
-    """
-
-    turns: int = 24
-    halved: int = 2
-    kept: int = 8
-    directions: int = 16
-    points: int = 100
-    steps: int = 4
-
-
-@dataclass(frozen=True)
-class SilhouetteConfig:
-    """How a placed model's silhouette is held against a mask (registration/silhouette.py).
-
-    edge : pixels at the mask's edge that count for neither side
-    around : part of the mask's longer side that is looked at beside it; least_around : pixels, at
-        least; rays, rays_beside : in and beside the mask, at most
-    near : metres, and nodes : spacings of the model's distances, of which the larger is how near
-        to a ray it covers that; touched : metres, how near it reaches into one beside the mask
-    """
-
-    edge: int = 1
-    around: float = 0.4
-    least_around: int = 8
-    rays: int = 200
-    rays_beside: int = 400
-    near: float = 0.002
-    nodes: float = 0.6
-    touched: float = 0.0005
-
-
-@dataclass(frozen=True)
 class ColourConfig:
     """Which of the placements that depth cannot tell apart has the colours of the image.
 

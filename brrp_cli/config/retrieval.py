@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from brrp_cli.config.ranges import between, share
-from brrp_cli.config.registration import MaskPosesConfig, SearchConfig, SilhouetteConfig
+from brrp_cli.config.registration import SearchConfig
+from brrp_cli.config.seen_mask import MaskPosesConfig, SilhouetteConfig
 
 
 @dataclass(frozen=True)
@@ -31,6 +32,7 @@ class ObservedAppearanceConfig:
     normal_neighbours: int = 30
     in_front: float = 0.01
     reach: int = 2
+    sparse: float = share(0.6)
 
 
 @dataclass(frozen=True)

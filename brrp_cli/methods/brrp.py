@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from contextlib import ExitStack
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from brrp_cli.config import PRESETS, Config
@@ -46,7 +47,9 @@ def run(frame: Frame, setup: Setup) -> Reconstruction:
         if config.hypotheses is not None:
             scene = look_at(frame, setup, retriever)
             frame, image = scene.frame, scene.image
-            sampled = sampled_scene(frame, config.observation, seed, image.plane)
+            # A stored object may be placed by its mask: see `hypotheses.mask`.
+            least = replace(config.observation, min_points=config.hypotheses.mask.least_points)
+            sampled = sampled_scene(frame, least, seed, image.plane)
             infer = stack.enter_context(by_hypotheses(scene, sampled, retriever, setup))
         else:
             image, sampled = None, sampled_scene(frame, config.observation, seed)

@@ -8,10 +8,11 @@ from functools import cache, partial
 import numpy as np
 from numpy.typing import NDArray
 
-from brrp_cli.completion.seen_surface import seen_surface
+from brrp_cli.completion.seen_surface import SeenSurface, seen_surface
 from brrp_cli.config import FittedMapConfig, HypothesesConfig
 from brrp_cli.config.registration import TrialConfig
 from brrp_cli.inference.placed_shape import PlacedShape
+from brrp_cli.methods.each_object import too_few
 from brrp_cli.methods.earlier_views import ALONE, EarlierViews, remember
 from brrp_cli.methods.infer_object import Shown, infer_object, placed_shape, shown_of
 from brrp_cli.methods.kin_hypotheses import KinHypothesis, beside_round, kin_hypotheses
@@ -20,6 +21,7 @@ from brrp_cli.methods.scene import Scene
 from brrp_cli.observation.ray_samples import ObjectObservation
 from brrp_cli.reconstruction import OK, ObjectReconstruction, Similar
 from brrp_cli.registration.pose_search import Hypothesis
+from brrp_cli.registration.seen_mask import SeenMask, seen_mask
 from brrp_cli.registration.verification import Verifier
 from brrp_cli.registration.weigh import counted_once
 from brrp_cli.retrieval.base import top_k, unknown
@@ -46,7 +48,9 @@ def reconstruct_by_hypotheses(
     frame, clear, image, seed = scene.frame, scene.clear, scene.image, scene.seed
     hypotheses = _hypotheses(scene, trial)
     object_id = observation.object_id
-    verifier = Verifier(_shuffled(observation.points, seed, object_id), frame, image.plane)
+    points = _shuffled(observation.points, seed, object_id)
+    mask = seen_mask(frame, object_id, len(points), image.plane, hypotheses.mask)
+    verifier = Verifier(points, frame, image.plane, mask)
     views = ALONE if earlier is None else earlier
     seconds: dict[str, float] = {}
     begun: dict[str, list[Hypothesis]] = {}
@@ -74,8 +78,12 @@ def reconstruct_by_hypotheses(
         told = partial(told, unknown_weight=found.unknown)
         if trial is not None:
             return told(retrieved=found.retrieved())
+        least = scene.config.observation.min_points
+        few = len(points) < least
+        if few and (image.plane is None or found.unknown > 0.5):
+            return too_few(object_id, len(points), least)
         like: list[KinHypothesis] = []
-        if found.unknown >= hypotheses.kin.least_unknown:
+        if not few and found.unknown >= hypotheses.kin.least_unknown:
             like = kin_hypotheses(
                 clear.object_points(object_id),
                 clear,
@@ -89,15 +97,21 @@ def reconstruct_by_hypotheses(
             )
 
     @cache
+    def surface() -> SeenSurface:
+        return seen_surface(clear, object_id, image.plane, image.noise, hypotheses.mean.ramp)
+
+    @cache
     def shown() -> Shown:
-        surface = seen_surface(clear, object_id, image.plane, image.noise, hypotheses.mean.ramp)
         cell = scene.config.observation.surface_cell
-        return shown_of(surface, observation, image.plane, cell, hypotheses)
+        return shown_of(surface(), observation, image.plane, cell, hypotheses)
 
     with timed(seconds, "inference"):
         if like and shown().axis is not None:
             like = beside_round(like, hypotheses.kin)
         shared = _shared_with_kin(found.weights, like)
+        if few:
+            # No shape is made of so few points.
+            shared[-1] = 0
         kept = _kept(shared, hypotheses.map)
         found, alike = placer.settled(found, kept[kept < len(found.placed)])
         posterior, guess = infer_object(
@@ -106,7 +120,7 @@ def reconstruct_by_hypotheses(
             image.plane,
             shown,
             image.wave,
-            _shapes(kept, found, alike, like, scene, observation, hypotheses, views),
+            _shapes(kept, found, alike, like, scene, observation, hypotheses, views, mask),
             shared[kept] / shared[kept].sum(),
             hypotheses,
             views,
@@ -126,7 +140,7 @@ def reconstruct_by_hypotheses(
             [(each, float(w)) for each, w in zip(found.placed, found.weights, strict=False)],
             found.ratios(),
             guess,
-            shown().surface,
+            surface(),
             not views,
             views.config.samples,
             child_rng(seed, "remembered", object_id),
@@ -183,12 +197,13 @@ def _shapes(
     observation: ObjectObservation,
     config: HypothesesConfig,
     views: EarlierViews,
+    mask: SeenMask | None,
 ) -> list[PlacedShape]:
     """Of the hypotheses `kept`: placements first, then kin; the completion has none."""
     count = len(found.placed)
     return [
         placed_shape(
-            found.placed[i], observation.points, scene.image.wave, config, views, alike.get(i)
+            found.placed[i], observation.points, scene.image.wave, config, views, alike.get(i), mask
         )
         if i < count
         else like[i - count].shape

@@ -34,6 +34,7 @@ from brrp_cli.observation.soft_samples import soft_samples
 from brrp_cli.observation.support_plane import Plane
 from brrp_cli.registration.pose_covariance import pose_covariance
 from brrp_cli.registration.pose_search import Hypothesis
+from brrp_cli.registration.seen_mask import SeenMask
 from brrp_cli.seeds import child_seed
 
 Array = NDArray[np.float64]
@@ -123,13 +124,21 @@ def placed_shape(
     config: HypothesesConfig,
     views: EarlierViews = ALONE,
     alike: Array | None = None,
+    mask: SeenMask | None = None,
 ) -> PlacedShape:
-    """Where `hypothesis` puts it; alike : (K, 4, 4) T_cam_model of placements that are as probable.
+    """Where `hypothesis` puts it; alike : (K, 4, 4) T_cam_model of placements that are as probable;
+    mask : of the object, where depth shows too little of it.
     The less the frame says for the placement, and the less it fixes its pose, the softer its
     surface."""
     stored, mean = hypothesis.model.stored, config.mean
     covariance = pose_covariance(
-        hypothesis.T_cam_model, hypothesis.model, observed, wave, config.sensor, views.points()
+        hypothesis.T_cam_model,
+        hypothesis.model,
+        observed,
+        wave,
+        config.sensor,
+        views.points(),
+        mask,
     )
     doubt = mean.doubt * max(0.0, mean.sure - hypothesis.alignment_score)
     shape = PlacedShape(

@@ -107,6 +107,7 @@ class Placer:
             sensor.patch,
             sensor.bleed,
             config.likelihood,
+            verifier.lost,
         )
 
     def placements(self, chosen: Chosen, begun: dict[str, list[Hypothesis]]) -> Placements:
@@ -176,6 +177,8 @@ class Placer:
         views = self._views
         placed = [each for group in found for each in group]
         shares = [p for (_, p), group in zip(chosen, found, strict=True) for _ in group]
+        if self._verifier.mask is not None:
+            placed = [self._nearer_if_better(each) for each in placed]
         placed, alone = judged(placed, self.seen, self._config, self._nearer)
         joint = alone
         if views and max(alone, default=-np.inf) > -views.config.against:
@@ -212,6 +215,21 @@ class Placer:
     def _nearer(self, each: Hypothesis) -> Hypothesis:
         wave = self._scene.image.wave
         return refined(each, self._verifier, wave, self._config, self._views.rays())
+
+    def _nearer_if_better(self, each: Hypothesis) -> Hypothesis:
+        """The placement brought to the edges of the mask, unless its alignment score falls by
+        that."""
+        search, nearer = self._config.search, self._nearer(each)
+        before, after = self._verifier.score(
+            np.stack([each.T_cam_model, nearer.T_cam_model]),
+            each.model,
+            search.alignment_score,
+            model_points=search.fine_points,
+            seen_points=search.fine_points,
+        )
+        if after < before:
+            return each
+        return replace(nearer, alignment_score=each.alignment_score + float(after - before))
 
     def _log_likelihood(self, model: Model, T_cam_model: Array) -> float:
         """Of a placement, against that it is none of the stored objects, nats."""

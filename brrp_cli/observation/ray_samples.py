@@ -144,12 +144,13 @@ def without_samples(frame: Frame, object_id: int) -> ObjectObservation:
 
 @kept_for_last_frame
 def scene_plane(frame: Frame, config: ObservationConfig, seed: int) -> Plane | None:
-    """The support plane of a frame's objects, of those with enough points; None where none is
-    found."""
+    """The support plane of a frame's objects, of those with enough points where there are any; None
+    where none is found."""
     points = [frame.object_points(i) for i in frame.object_ids]
-    centers = [box_center(p) for p in points if len(p) >= config.min_points]
-    if not centers:
+    seen = [p for p in points if len(p) >= config.min_points] or [p for p in points if len(p)]
+    if not seen:
         return None
+    centers = [box_center(p) for p in seen]
     background = frame.points[frame.valid & (frame.segmap == BACKGROUND)]
     things = np.concatenate(points)
     plane = supporting_plane(background, things, config, seed, np.mean(centers, axis=0))

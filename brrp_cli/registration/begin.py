@@ -34,6 +34,7 @@ def best_brought_nearer(
         T,
         model,
         verifier,
+        config,
         config.begun_points,
         config.coarse_distance,
         config.begun_steps,
@@ -77,11 +78,18 @@ def brought_nearer(
     T_cam_model: Array,
     model: ModelGeometry,
     verifier: Verifier,
+    config: SearchConfig,
     points: int,
     distance: float,
     steps: int,
 ) -> Array:
     """Each placement (B, 4, 4) with so many observed points brought onto its surface; its size
-    stays. Points further from it than `distance` metres do not pull."""
+    stays. Points further from it than `distance` metres do not pull. Where depth shows too little
+    of the object, a placement that is none the better stays as it was."""
     seen = verifier.points[:points]
-    return inverses(refine_to_sdf(inverses(T_cam_model), seen, model, distance, steps))
+    T = inverses(refine_to_sdf(inverses(T_cam_model), seen, model, distance, steps))
+    if verifier.mask is None:
+        return T
+    before = coarse_score(T_cam_model, model, verifier, config)
+    better = coarse_score(T, model, verifier, config) > before
+    return np.where(better[:, None, None], T, T_cam_model)

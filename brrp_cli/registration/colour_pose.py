@@ -83,27 +83,43 @@ def best_and_different(turns: Array, score: Array, count: int, apart: float) -> 
     return np.array([*different, *rest][:count], dtype=np.int64)
 
 
-def colour_agreement(T_cam_model: Array, model: Model, frame: Frame, config: ColourConfig) -> float:
+def colour_agreement(
+    T_cam_model: Array,
+    model: Model,
+    frame: Frame,
+    config: ColourConfig,
+    lost: NDArray[np.bool_] | None = None,
+) -> float:
     """Correlation of the colours that are stored and seen: see `_compared`."""
-    return _compared(T_cam_model, model, frame, config)[0]
+    return _compared(T_cam_model, model, frame, config, lost)[0]
 
 
 def textured_agreement(
-    T_cam_model: Array, model: Model, frame: Frame, config: ColourConfig
+    T_cam_model: Array,
+    model: Model,
+    frame: Frame,
+    config: ColourConfig,
+    lost: NDArray[np.bool_] | None = None,
 ) -> float:
     """The same, less where there is little to compare: on a plain thing light and shadow decide."""
-    correlation, contrast = _compared(T_cam_model, model, frame, config)
+    correlation, contrast = _compared(T_cam_model, model, frame, config, lost)
     return correlation * min(1.0, contrast / config.textured) ** 2
 
 
 def _compared(
-    T_cam_model: Array, model: Model, frame: Frame, config: ColourConfig
+    T_cam_model: Array,
+    model: Model,
+    frame: Frame,
+    config: ColourConfig,
+    lost: NDArray[np.bool_] | None,
 ) -> tuple[float, float]:
     """Correlation, -1 to 1, of the stored colours of what faces the camera, placed by T_cam_model
     (4, 4), with the image's at the same pixels; each channel about its own mean, so that the
     light's brightness and hue do not count. Both are means over cells of the surface: letters lie
     a little elsewhere. 0 where there is too little to see, or nothing but one colour. And the
-    standard deviation of the stored colours, of 255."""
+    standard deviation of the stored colours, of 255.
+
+    lost : (H, W) pixels of the object that have no depth, where that alone would be too few"""
     sample = _sampled(model.stored.shape, model.stored.half_extent, config.vertices, config.cell)
     # In the model's axes, where its normals are the same for all placements.
     camera = np.linalg.inv(T_cam_model)[:3, 3]
@@ -111,7 +127,10 @@ def _compared(
     points = transform_points(T_cam_model, sample.points[facing])
     pixel, inside = pixel_numbers(points, frame)
     off = np.abs(frame.depth.ravel()[pixel] - points[:, 2])
-    near = np.flatnonzero(inside & (off < config.near))
+    shown = off < config.near
+    if lost is not None:
+        shown |= lost.ravel()[pixel]
+    near = np.flatnonzero(inside & shown)
     if len(near) < config.least_seen:
         return 0.0, 0.0
     seen = facing[near]

@@ -56,7 +56,7 @@ class SeenObject:
     nearer to its mask than sensors blur; on_table : as high as the table; background : no object's;
     depth : metres, NaN where there is none; fine : metres; steady : away from jumps of depth
     wave : metres, of patches; rays_per_patch, patches_per_vote : 1 or more; colours : of the object
-    and around it
+    and around it; lost : (H, W) its pixels without depth, where that shows too little of it
     """
 
     frame: Frame
@@ -76,6 +76,7 @@ class SeenObject:
     patches_per_vote: float
     bleed: int
     colours: Surroundings
+    lost: Mask | None
 
 
 @dataclass(frozen=True)
@@ -111,10 +112,11 @@ def see(
     patch: float,
     bleed: float,
     config: LikelihoodConfig,
+    lost: Mask | None = None,
 ) -> SeenObject:
     """One object of a frame, for as many placements as there are.
 
-    patch : metres; bleed : radians by which silhouettes are uncertain
+    patch : metres; bleed : radians by which silhouettes are uncertain; lost : as of `SeenObject`
     """
     mask = frame.segmap == object_id
     middle = float(np.median(frame.points[mask & frame.valid][:, 2]))
@@ -153,6 +155,7 @@ def see(
         patches_per_vote=noise.patches_per_vote,
         bleed=max(1, round(blur / stride)),
         colours=surroundings(frame.rgb[part], own, background, config.colours),
+        lost=lost,
     )
 
 
@@ -193,7 +196,7 @@ def evidence(
         free=float(free.sum() / votes),
         unmasked=_surrounding(shown, part, seen, config) / votes,
         below=_below(T_cam_model, model, seen.plane, config),
-        colour=colour_agreement(T_cam_model, model, seen.frame, colour)
+        colour=colour_agreement(T_cam_model, model, seen.frame, colour, seen.lost)
         if model.stored.record.get("coloured")
         else 0.0,
     )

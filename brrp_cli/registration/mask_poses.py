@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from brrp_cli.config.registration import MaskPosesConfig
+from brrp_cli.config.seen_mask import MaskPosesConfig
 from brrp_cli.frames.frame import Frame
 from brrp_cli.observation.support_plane import Plane, plane_frame
 from brrp_cli.registration.initial_poses import turns

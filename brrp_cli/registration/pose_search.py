@@ -66,12 +66,20 @@ def search(
 
     best : alignment score that another model has reached
     """
+    by_mask = np.zeros((0, 4, 4)) if verifier.mask is None else verifier.mask.poses(model)
     T = _initial_poses(model, observed, verifier, features, config, seed)
+    T = np.concatenate([by_mask, T])
     T, scores = best_brought_nearer(T, model, verifier, config)
     if scores[0] < config.unpromising:
         return _judged(T[:1], model, verifier, config)
     T = brought_nearer(
-        T, model, verifier, config.coarse_points, config.coarse_distance, config.coarse_steps
+        T,
+        model,
+        verifier,
+        config,
+        config.coarse_points,
+        config.coarse_distance,
+        config.coarse_steps,
     )
     least = max(config.hopeless, best - config.beaten)
     for count, points, distance, steps in (
@@ -81,7 +89,7 @@ def search(
         T, scores = best_of(T, model, verifier, config, count)
         if scores[0] < least:
             return _judged(T[:1], model, verifier, config)
-        T = brought_nearer(different(T, config), model, verifier, points, distance, steps)
+        T = brought_nearer(different(T, config), model, verifier, config, points, distance, steps)
     found = _judged(T, model, verifier, config)
     found = by_colour(found, verifier, config)
     if found[0].alignment_score < config.settled:
@@ -111,7 +119,13 @@ def start_from(
     """Placements (B, 4, 4) that were found in an earlier frame, and `scale` (B,) of each: as they
     were and refined to this frame, those that differ, best first."""
     moved = brought_nearer(
-        T_cam_model, model, verifier, config.fine_points, config.fine_distance, config.fine_steps
+        T_cam_model,
+        model,
+        verifier,
+        config,
+        config.fine_points,
+        config.fine_distance,
+        config.fine_steps,
     )
     log = np.log(scale)
     resized = np.abs(log) > config.least_size_change
@@ -148,19 +162,23 @@ def by_colour(
         T[best_and_different(turns[:, :3, :3], score, config.middle, colour.apart)],
         model,
         verifier,
+        config,
         config.middle_points,
         config.fine_distance,
         config.middle_steps,
     )
     T = different(T, config)
+    # Where depth shows little, what lies otherwise may be as like it as what is turned.
+    before = [best] if verifier.mask is None else found
     alike = [
         each
-        for each in [best, *_judged(T, model, verifier, config)]
+        for each in [*before, *_judged(T, model, verifier, config)]
         if each.alignment_score >= best.alignment_score - colour.alike
     ]
     both = [
         each.alignment_score
-        + colour.worth * textured_agreement(each.T_cam_model, model, verifier.frame, colour)
+        + colour.worth
+        * textured_agreement(each.T_cam_model, model, verifier.frame, colour, verifier.lost)
         for each in alike
     ]
     chosen = int(np.argmax(both))

@@ -20,7 +20,9 @@ from brrp_cli.geometry import normalise, transform_points
 from brrp_cli.observation.sensor_noise import depth_deviation
 from brrp_cli.observation.support_plane import Plane
 from brrp_cli.prior.shape import StoredShape
+from brrp_cli.registration.mask_edges import MaskEdges
 from brrp_cli.registration.ray_loops import pull_of_rays
+from brrp_cli.registration.seen_mask import SeenMask
 
 Array = NDArray[np.float64]
 # What residuals cost, nats, and the normal equations, (6, 6) and (6,), of turn and shift.
@@ -37,6 +39,7 @@ def refine_by_rays(
     sensor: SensorConfig,
     config: RayRefinementConfig,
     others: Sequence[OtherRays] = (),
+    mask: SeenMask | None = None,
 ) -> Array:
     """T_cam_shape (4, 4), a similarity, followed by the small rigid motion under which the rays of
     the observed points (n, 3), metres, camera frame, in random order, meet the shape where depth
@@ -45,15 +48,26 @@ def refine_by_rays(
     focal_length : pixels, of the pixel's width; plane : what the object may stand on; wave :
     metres, standard deviation of the mean depth of a patch (observation/sensor_noise.py)
     others : what other views measured, each from a camera of its own
+    mask : of the object, where depth shows too little of it
     """
     own = OtherRays(observed, focal_length, wave, np.eye(4))
     views = [_looked_up(view, sensor, config) for view in (own, *others)]
+    trust = [1.0 if mask is None else mask.trust, *(1.0 for _ in others)]
     middle = transform_points(T_cam_shape, shape.vertices.mean(axis=0, keepdims=True))[0]
 
+    let_go = config.outlier * config.standing
+    if mask is not None:
+        let_go = max(let_go, (1 - mask.trust) * mask.config.high)
+
     def pull(T: Array) -> Pull:
-        parts = [_of_view(T, shape, view, middle, config) for view in views]
+        parts = [
+            _of_view(T, shape, view, middle, share * config.independent, config.outlier)
+            for view, share in zip(views, trust, strict=True)
+        ]
         if plane is not None:
-            parts.append(_of_standing(T, shape, plane, middle, config))
+            parts.append(_of_standing(T, shape, plane, middle, let_go, config))
+        if mask is not None:
+            parts.append(_of_edges(T, shape, mask.edges, middle, config))
         costs, normals, falls = zip(*parts, strict=True)
         return sum(costs), np.sum(normals, axis=0), np.sum(falls, axis=0)
 
@@ -107,10 +121,10 @@ def _looked_up(view: OtherRays, sensor: SensorConfig, config: RayRefinementConfi
 
 
 def _of_view(
-    T: Array, shape: StoredShape, view: _View, middle: Array, config: RayRefinementConfig
+    T: Array, shape: StoredShape, view: _View, middle: Array, independent: float, outlier: float
 ) -> Pull:
-    """That of a view's points, in this frame's camera, along the normals where their rays meet the
-    shape.
+    """That of a view's points, of which the share `independent` counts, in this frame's camera,
+    along the normals where their rays meet the shape.
 
     A ray that misses the shape is held against its nearest point.
     """
@@ -131,8 +145,8 @@ def _of_view(
         np.asarray(transform_points(view.T_view_cam, middle), dtype=np.float64),
         view.along,
         view.pixel,
-        config.outlier,
-        config.independent,
+        outlier,
+        independent,
     )
     # From the view's axes to this frame's.
     turn = np.kron(np.eye(2), view.T_view_cam[:3, :3])
@@ -140,19 +154,36 @@ def _of_view(
 
 
 def _of_standing(
-    T: Array, shape: StoredShape, plane: Plane, middle: Array, config: RayRefinementConfig
+    T: Array,
+    shape: StoredShape,
+    plane: Plane,
+    middle: Array,
+    let_go: float,
+    config: RayRefinementConfig,
 ) -> Pull:
     """That of the shape's lowest point, which touches the plane where the object stands on it;
-    far above it, Tukey's biweight lets go."""
+    `let_go` metres above it, Tukey's biweight lets go."""
     down = (T[:3, :3].T @ plane.normal).astype(np.float32)
     lowest = shape.vertices[int(np.argmin(shape.vertices @ down))].astype(np.float64)
     at = np.asarray(transform_points(T, lowest), dtype=np.float64)
     row = np.concatenate([np.cross(at - middle, plane.normal), plane.normal])
     height = float(at @ plane.normal + plane.offset)
-    share = max(0.0, 1 - (height / (config.outlier * config.standing)) ** 2)
-    cost = config.outlier**2 / 6 * (1 - share**3)
+    share = max(0.0, 1 - (height / let_go) ** 2)
+    cost = (let_go / config.standing) ** 2 / 6 * (1 - share**3)
     weight = share**2 / config.standing**2
     return cost, weight * np.outer(row, row), -weight * height * row
+
+
+def _of_edges(
+    T: Array, shape: StoredShape, edges: MaskEdges, middle: Array, config: RayRefinementConfig
+) -> Pull:
+    """That of the mask's edges, which the shape reaches; far from them, Tukey's biweight lets
+    go."""
+    gap, rows = edges.gaps(T, shape.vertices.astype(np.float64), middle)
+    share = np.maximum(0.0, 1 - (gap / (config.outlier * edges.deviation)) ** 2)
+    weight = share**2 / edges.deviation**2
+    cost = float((config.outlier**2 / 6 * (1 - share**3)).sum())
+    return cost, rows.T @ (weight[:, None] * rows), rows.T @ (weight * gap)
 
 
 def _moved(T: Array, step: Array, middle: Array) -> Array:

@@ -34,6 +34,7 @@ def refined(
         config.sensor,
         config.refine,
         others,
+        verifier.mask,
     )
     T_cam_model = T_cam_object @ np.linalg.inv(hypothesis.model.T_model_object)
     return replace(hypothesis, T_cam_model=T_cam_model)

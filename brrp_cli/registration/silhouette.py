@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from brrp_cli.config.registration import SilhouetteConfig
+from brrp_cli.config.seen_mask import SilhouetteConfig
 from brrp_cli.distance_loops import nearest_along
 from brrp_cli.frames.dilate import dilated, mask_box
 from brrp_cli.frames.frame import BACKGROUND, Frame

@@ -212,6 +212,9 @@ def _as_much_alike(
         return np.ones(len(T), dtype=np.bool_)
     colour = config.colour
     agreement = np.array(
-        [textured_agreement(each, placed.model, verifier.frame, colour) for each in T]
+        [
+            textured_agreement(each, placed.model, verifier.frame, colour, verifier.lost)
+            for each in T
+        ]
     )
     return np.asarray(colour.worth * (agreement - agreement[0]) >= -colour.gain)

@@ -14,6 +14,7 @@ from brrp_cli.observation.support_plane import Plane
 from brrp_cli.registration.free_space_loops import contradicted
 from brrp_cli.registration.model import ModelGeometry
 from brrp_cli.registration.outline import Outline, outline
+from brrp_cli.registration.seen_mask import SeenMask
 from brrp_cli.registration.transform_loops import inverses
 
 Array = NDArray[np.float64]
@@ -22,14 +23,21 @@ Array = NDArray[np.float64]
 @dataclass(frozen=True)
 class Verifier:
     """One seen object: its points (n, 3), metres, camera frame, in random order, the frame that
-    shows it, and the plane it stands on, where there is one."""
+    shows it, the plane it stands on, where there is one, and its mask where depth shows too little
+    of it."""
 
     points: Array
     frame: Frame
     plane: Plane | None
+    mask: SeenMask | None = None
     _outlines: dict[tuple[int, float], Outline] = field(
         default_factory=dict, init=False, repr=False, compare=False
     )
+
+    @property
+    def lost(self) -> NDArray[np.bool_] | None:
+        """(H, W) the object's pixels that have no depth, where depth shows too little of it."""
+        return None if self.mask is None else self.mask.lost
 
     def outline(self, config: SearchConfig) -> Outline:
         """How the points lie, found once for all models."""
@@ -50,8 +58,9 @@ class Verifier:
         """Evidence (B,) of placements T_cam_model (B, 4, 4), similarities; 1 at best.
 
         For: observed points on the model's surface. Against: observed points far from it, model
-        surface in space that the camera saw to be free, model surface below the plane. Each is a
-        share, so that seen and hidden sides, large and small objects are judged alike.
+        surface in space that the camera saw to be free, model surface below the plane, and what the
+        mask says. Each is a share, so that seen and hidden sides, large and small objects are
+        judged alike.
         """
         T = np.ascontiguousarray(T_cam_model, dtype=np.float64)
         distances, plane = model.field, self.plane
@@ -69,11 +78,13 @@ class Verifier:
         unlike = contradicted(
             T,
             model.surface[:model_points],
-            self.frame.depth,
+            self.frame.depth if self.mask is None else self.mask.depth,
             self.frame.K,
             np.zeros(3) if plane is None else plane.normal,
             np.inf if plane is None else plane.offset,
             config.tolerance,
             config.slope,
         )
+        if self.mask is not None:
+            like = self.mask.believed(like) - self.mask.against(T, model, config.tolerance)
         return like - config.contradiction * unlike

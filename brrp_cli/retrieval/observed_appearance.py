@@ -48,7 +48,9 @@ def see_object(
     points = seen[solid].astype(np.float64)
     colours = shares = None
     if frame.coloured:
-        inner = _inner(solid if solid.any() else mask, config.inner)
+        # Depth that is missing is missing of what is dark or shiny, not of any part.
+        sparse = frame.valid[box][mask].sum() < config.sparse * mask.sum()
+        inner = _inner(mask if sparse or not solid.any() else solid, config.inner)
         colours, shares = palette(frame.rgb[box][inner])
     pairs = _pairs(points, config)
     size = None if plane is None or pairs is None else _size(points, plane, config)

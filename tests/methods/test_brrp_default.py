@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import trimesh
+from sparse_depth import at_the_edge, without_depth
 from table_scene import T_CAM_WORLD, T_WORLD_CAM, box, in_camera, photograph, placed
 
 from brrp_cli import Reconstructor, open_posterior, open_prior, reconstruct, write_results
@@ -19,7 +20,7 @@ from brrp_cli.ground_truth.surface_metrics import MeshSurface
 from brrp_cli.prior.build.build import build_prior
 from brrp_cli.prior.parameters import AppearanceConfig, BuildParameters
 from brrp_cli.raycast import inside
-from brrp_cli.reconstruction import METRES, NO_SURFACE, OK
+from brrp_cli.reconstruction import METRES, NO_SURFACE, OK, TOO_FEW_POINTS
 from brrp_cli.retrieval.given import TruthRetriever
 from brrp_cli.shapes import solids
 
@@ -133,6 +134,33 @@ def test_an_object_that_the_prior_does_not_hold_gets_the_shape_of_what_was_seen(
     front, back = uncertainty(found)
     assert 0.0005 < front < back < 0.05, "less is known of what nobody saw"
     assert iou(found.surface, strange) > 0.6
+
+
+@pytest.mark.parametrize("stream", [False, True])
+def test_a_stored_object_with_hardly_any_depth_is_placed_by_its_mask(folder, truth, stream):
+    """Eight points at the edge of its mask, and those are 2 cm too far away."""
+    frame, prior = at_the_edge(photograph(truth), BOX, 8, 0.02), open_prior(folder)
+    if stream:
+        with Reconstructor(prior, workers=1, track=True) as session:
+            found = session(frame)
+    else:
+        found = reconstruct(frame, prior)
+    item = next(each for each in found.objects if each.object_id == BOX)
+    assert item.status == OK and item.n_points == 8
+    assert max(item.retrieved, key=lambda each: each.weight).name == "box"
+    assert iou(item.surface, truth[BOX]) > 0.85
+    assert item.surface.uncertainty.mean() > 0.003, "where it stands is supposed, not seen"
+
+
+def test_no_shape_is_made_of_a_few_points_of_what_the_prior_does_not_hold(folder):
+    strange = in_camera(solids.box(0.20, 0.05, 0.05), placed(0.0, 0.0, 1.3))
+    frame = at_the_edge(photograph({STRANGE: strange}), STRANGE, 8, 0.0)
+    found = reconstruct(frame, open_prior(folder)).objects[0]
+    assert found.status == TOO_FEW_POINTS and found.surface is None
+    assert "8 valid depth points, 16 are needed" in found.message
+    bare = without_depth(frame, STRANGE)
+    found = reconstruct(bare, open_prior(folder)).objects[0]
+    assert found.status == TOO_FEW_POINTS and found.n_points == 0
 
 
 def test_retrieval_that_is_wrong_is_outweighed_by_what_the_frame_says(folder, truth):

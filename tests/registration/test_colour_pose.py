@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
+from sparse_depth import without_depth
 from table_scene import MESHES, TABLE, in_camera, photograph, placed, stored
 
 from brrp_cli.config import ColourConfig, SearchConfig
@@ -87,6 +88,16 @@ def test_the_search_turns_a_box_round_by_its_colours(scene) -> None:
     right = replace(best, T_cam_model=T)
     kept = by_colour([right, replace(aside, alignment_score=0.5)], verifier, config)[0]
     np.testing.assert_allclose(kept.T_cam_model[:3, [0, 3]], T[:3, [0, 3]], atol=2e-3)
+
+
+def test_colours_count_too_where_an_object_has_lost_its_depth(scene) -> None:
+    model, T, frame = scene
+    dark = without_depth(frame, 1)
+    lost = dark.segmap == 1
+    assert colour_agreement(T, model, dark, CONFIG) == 0
+    assert colour_agreement(T, model, dark, CONFIG, lost) > 0.8
+    back_to_front = T @ similarity(rotation=np.diag([-1.0, -1.0, 1.0]))
+    assert colour_agreement(back_to_front, model, dark, CONFIG, lost) < -0.8
 
 
 def test_faint_colours_say_little_and_strong_ones_all(scene) -> None:

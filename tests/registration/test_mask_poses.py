@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from table_scene import MESHES, TABLE, K, in_camera, photograph, placed, stored
 
-from brrp_cli.config.registration import MaskPosesConfig
+from brrp_cli.config.seen_mask import MaskPosesConfig
 from brrp_cli.geometry import backproject, transform_points
 from brrp_cli.registration.mask_poses import mask_outline, poses_from_mask
 from brrp_cli.registration.model import search_model

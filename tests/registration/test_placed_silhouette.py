@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 from table_scene import K, box, in_camera, photograph, placed, stored
 from trimesh import creation
 
-from brrp_cli.config.registration import SilhouetteConfig
+from brrp_cli.config.seen_mask import SilhouetteConfig
 from brrp_cli.distance_loops import nearest_along
 from brrp_cli.frames.frame import Frame
 from brrp_cli.geometry import backproject, similarity
