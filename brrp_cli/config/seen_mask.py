@@ -14,7 +14,8 @@ class MaskPosesConfig:
     turns : about the plane's normal, of each resting pose; halved : times that the steps between
         them are halved about the best; kept : how many of the best
     directions : of the image, in which outlines are compared; points : of the model's surface;
-        steps : towards the mask
+        steps : towards the mask; edge_width : pixels from the border or another object, within
+        which the mask may be cut
     """
 
     turns: int = 24
@@ -23,6 +24,7 @@ class MaskPosesConfig:
     directions: int = 16
     points: int = 100
     steps: int = 4
+    edge_width: int = 2
 
 
 @dataclass(frozen=True)

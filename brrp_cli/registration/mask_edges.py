@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brrp_cli.config.seen_mask import SeenMaskConfig
-from brrp_cli.frames.dilate import dilated
+from brrp_cli.frames.dilate import dilated, mask_box
 from brrp_cli.frames.frame import BACKGROUND, Frame
 from brrp_cli.geometry import transform_points
 
@@ -48,26 +48,39 @@ class MaskEdges:
 
 
 def mask_edges(frame: Frame, object_id: int, config: SeenMaskConfig) -> MaskEdges:
-    """Those of an object of the frame. Where it reaches furthest beside another one that stands in
-    front, or at the image's border, it may go on."""
-    mask = frame.segmap == object_id
-    angle = np.arange(config.directions) * (2 * np.pi / config.directions)
-    directions = np.stack([np.cos(angle), np.sin(angle)], axis=1)
-    rows, columns = np.nonzero(mask)
-    along = np.stack([columns, rows], axis=1) @ directions.T
-    reach = along.max(axis=0)
-    cut = _cut(frame, mask, config)[rows, columns]
-    free = np.array([not cut[far].any() for far in (along > reach - config.edge_width).T])
+    """Those of an object of the frame that nothing may cut."""
+    directions = around(config.directions)
+    reach, cut = reach_of(frame, object_id, directions, config.edge_width)
     return MaskEdges(
-        reach[free], directions[free], frame.K.astype(np.float64), config.edge_deviation
+        reach[~cut], directions[~cut], frame.K.astype(np.float64), config.edge_deviation
     )
 
 
-def _cut(frame: Frame, mask: NDArray[np.bool_], config: SeenMaskConfig) -> NDArray[np.bool_]:
-    """Pixels (h, w) near the image's border, or near another object."""
-    others = (frame.segmap != BACKGROUND) & ~mask
-    cut = dilated(others, config.edge_width)
-    width = config.edge_width
-    cut[:width] = cut[-width:] = True
-    cut[:, :width] = cut[:, -width:] = True
-    return cut
+def around(count: int) -> Array:
+    """(count, 2) directions of the image, evenly spread."""
+    angle = np.arange(count) * (2 * np.pi / count)
+    return np.stack([np.cos(angle), np.sin(angle)], axis=1)
+
+
+def reach_of(
+    frame: Frame, object_id: int, directions: Array, width: int
+) -> tuple[Array, NDArray[np.bool_]]:
+    """How far an object's mask reaches along directions (d, 2), pixels (d,), and where it may go on
+    (d,): it is cut there by the image's border or by another object, within `width` pixels."""
+    mask = frame.segmap == object_id
+    rows, columns = np.nonzero(mask)
+    along = np.stack([columns, rows], axis=1) @ directions.T
+    reach = along.max(axis=0)
+    beside = _beside_others(frame, mask, width)[rows, columns]
+    cut = [bool(beside[far].any()) for far in (along > reach - width).T]
+    return reach, np.array(cut)
+
+
+def _beside_others(frame: Frame, mask: NDArray[np.bool_], width: int) -> NDArray[np.bool_]:
+    """(H, W) pixels of a mask near the image's border, or near another object."""
+    found, box = np.zeros_like(mask), mask_box(mask, width)
+    others = (frame.segmap[box] != BACKGROUND) & ~mask[box]
+    found[box] = dilated(others, width)
+    found[:width] = found[-width:] = True
+    found[:, :width] = found[:, -width:] = True
+    return found & mask

@@ -22,6 +22,7 @@ def shifted(
     eye: Array,
     ray: Array,
     reach: Array,
+    cut: Array,
     directions: Array,
     steps: int,
 ) -> tuple[Array, Array]:
@@ -30,7 +31,8 @@ def shifted(
     what is then behind the camera.
 
     eye, ray : (3,) of the camera, and through the mask's middle, downwards, in the plane's frame
-    reach : (d,) pixels, of the mask along `directions` (d, 2), evenly spread
+    reach : (d,) pixels, of the mask along `directions` (d, 2), evenly spread; cut : (d,) 1 where it
+    may go on, so that a placement that reaches further does not differ from it, 0 elsewhere
     """
     T = T_plane_model.copy()
     off = np.empty(len(T))
@@ -51,6 +53,8 @@ def shifted(
                     most[d] = max(most[d], x[d] * u + y[d] * v)
             for d in range(len(x)):
                 gap[d] = reach[d] - most[d]
+                if cut[d] > 0:
+                    gap[d] = max(gap[d], 0.0)
         off[b] = np.abs(gap).mean() if seen else np.inf
     return T, off
 

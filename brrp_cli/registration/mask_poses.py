@@ -16,6 +16,7 @@ from brrp_cli.config.seen_mask import MaskPosesConfig
 from brrp_cli.frames.frame import Frame
 from brrp_cli.observation.support_plane import Plane, plane_frame
 from brrp_cli.registration.initial_poses import turns
+from brrp_cli.registration.mask_edges import around, reach_of
 from brrp_cli.registration.mask_loops import shifted
 from brrp_cli.registration.model import ModelGeometry
 
@@ -24,12 +25,14 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class MaskOutline:
-    """How far a mask reaches in the image, without what stands behind it.
+    """How far a mask reaches in the image.
 
-    reach : (d,) pixels along `directions` (d, 2), evenly spread; K : (3, 3); T_cam_plane : (4, 4)
+    reach : (d,) pixels along `directions` (d, 2), evenly spread; cut : (d,) 1 where it may go on, 0
+    where it ends; K : (3, 3); T_cam_plane : (4, 4)
     """
 
     reach: Array
+    cut: Array
     directions: Array
     K: Array
     T_cam_plane: Array
@@ -49,12 +52,11 @@ def mask_outline(
     frame: Frame, object_id: int, plane: Plane, config: MaskPosesConfig
 ) -> MaskOutline:
     """The outline of an object of the frame."""
-    angle = np.arange(config.directions) * (2 * np.pi / config.directions)
-    directions = np.stack([np.cos(angle), np.sin(angle)], axis=1)
-    rows, columns = np.nonzero(frame.segmap == object_id)
-    pixels = np.stack([columns, rows], axis=1).astype(np.float64)
+    directions = around(config.directions)
+    reach, cut = reach_of(frame, object_id, directions, config.edge_width)
     return MaskOutline(
-        reach=(pixels @ directions.T).max(axis=0),
+        reach=reach,
+        cut=cut.astype(np.float64),
         directions=directions,
         K=frame.K.astype(np.float64),
         T_cam_plane=np.linalg.inv(np.asarray(plane_frame(plane), dtype=np.float64)),
@@ -115,6 +117,7 @@ def _shifted(
         eye,
         ray,
         seen.reach,
+        seen.cut,
         seen.directions,
         config.steps,
     )
