@@ -114,6 +114,7 @@ def reconstruct_by_hypotheses(
             shared[-1] = 0
         kept = _kept(shared, hypotheses.map)
         found, alike = placer.settled(found, kept[kept < len(found.placed)])
+        shared[: len(found.placed)] = found.weights[:-1]
         posterior, guess = infer_object(
             observation,
             frame,

@@ -42,7 +42,7 @@ class Placements:
     """Where retrieved objects may lie.
 
     chosen : the m objects that were tried; counts : (m,) how many placements there are of each
-    placed : all n of them, in the order of `chosen`, the best of each object first
+    placed : all n of them, in the order of `chosen`, by alignment score
     alone : (n,) log likelihood ratios in this frame, nats, against that it is none of them
     weights : (n + 1,) of the placements, and last that it is none of them
     """
@@ -61,20 +61,22 @@ class Placements:
     @property
     def heaviest(self) -> float:
         """Weight of the heaviest stored object, of all of its placements."""
-        return max((float(self.weights[a:b].sum()) for a, b in self._groups()), default=0.0)
+        return max((float(self.weights[a:b].sum()) for a, b in self.groups()), default=0.0)
 
     def ratios(self) -> dict[str, float]:
         """Of each object the best log likelihood ratio in this frame, nats."""
         return best_ratios(self.placed, self.alone)
 
     def retrieved(self) -> list[Retrieved]:
-        """Each object with its best placement and the weight of all of them."""
+        """Each object with its heaviest placement, the first of those that weigh as much, and the
+        weight of all of them."""
         return [
-            _retrieved(name, probability, self.placed[a:b], float(self.weights[a:b].sum()))
-            for (name, probability), (a, b) in zip(self.chosen, self._groups(), strict=True)
+            _retrieved(name, probability, self.placed[a:b], self.weights[a:b])
+            for (name, probability), (a, b) in zip(self.chosen, self.groups(), strict=True)
         ]
 
-    def _groups(self) -> Iterable[tuple[int, int]]:
+    def groups(self) -> Iterable[tuple[int, int]]:
+        """First and last but one index of each object's placements."""
         return pairwise(np.cumsum([0, *self.counts]).tolist())
 
 
@@ -126,7 +128,8 @@ class Placer:
         self, found: Placements, kept: NDArray[np.int64]
     ) -> tuple[Placements, dict[int, Array]]:
         """The placements with those of the indices `kept` brought nearer and turned as is most
-        probable, and by index the turns (K, 4, 4), T_cam_model, that are as good."""
+        probable, and by index the turns (K, 4, 4), T_cam_model, that are as good. The weight of an
+        object stays; that of its placements follows from how probable they have become."""
         placed, alike = list(found.placed), {}
         for i in kept.tolist():
             placed[i] = self._nearer(placed[i])
@@ -140,7 +143,25 @@ class Placer:
                     self._nearer,
                 )
                 placed[i], alike[i] = best.best, best.alike
-        return replace(found, placed=placed), alike
+        weights = found.weights.copy()
+        if not self._views:
+            for a, b in found.groups():
+                of_one = kept[(a <= kept) & (kept < b)]
+                if len(of_one) > 1:
+                    weights[of_one] = self._shared_out(
+                        weights[of_one].sum(), [placed[i] for i in of_one.tolist()]
+                    )
+        return replace(found, placed=placed, weights=weights), alike
+
+    def _shared_out(self, weight: float, placed: Sequence[Hypothesis]) -> Array:
+        """The weight of placements of one object, (n,), as probable as they are."""
+        log = np.array([self._log_likelihood(each.model, each.T_cam_model) for each in placed])
+        resized = np.array([abs(np.log(each.scale)) for each in placed])
+        log -= self._config.likelihood.other_size * (
+            resized > self._config.search.least_size_change
+        )
+        share = np.exp(log - log.max())
+        return np.asarray(weight * share / share.sum())
 
     def _searched(
         self, chosen: Chosen, begun: dict[str, list[Hypothesis]], skipped: frozenset[str]
@@ -239,12 +260,13 @@ class Placer:
 
 
 def _retrieved(
-    name: str, probability: float, group: Sequence[Hypothesis], weight: float
+    name: str, probability: float, group: Sequence[Hypothesis], weights: Array
 ) -> Retrieved:
-    """The object with its best placement, and the weight of all of them."""
+    """The object with the heaviest of its placements, and the weight of all of them."""
+    weight = float(weights.sum())
     if not group:
         return Retrieved(name, probability, weight=weight)
-    best = group[0]
+    best = group[int(weights.argmax())]
     T_cam_mesh, _ = best.model.stored.mesh_pose(best.T_cam_object)
     return Retrieved(
         name,

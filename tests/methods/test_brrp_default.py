@@ -17,10 +17,16 @@ from brrp_cli.demo.layout import turn
 from brrp_cli.errors import BrrpError, RetrievalError
 from brrp_cli.geometry import similarity, transform_points
 from brrp_cli.ground_truth.surface_metrics import MeshSurface
+from brrp_cli.methods.base import Setup
+from brrp_cli.methods.earlier_views import ALONE
+from brrp_cli.methods.placements import Placements, Placer
+from brrp_cli.methods.scene import look_at
+from brrp_cli.observation.ray_samples import without_samples
 from brrp_cli.prior.build.build import build_prior
 from brrp_cli.prior.parameters import AppearanceConfig, BuildParameters
 from brrp_cli.raycast import inside
 from brrp_cli.reconstruction import METRES, NO_SURFACE, OK, TOO_FEW_POINTS
+from brrp_cli.registration.verification import Verifier
 from brrp_cli.retrieval.given import TruthRetriever
 from brrp_cli.shapes import solids
 
@@ -101,6 +107,36 @@ def test_the_best_placement_is_the_true_one(result, truth, folder):
     radius, height = np.hypot(*local[:, :2].T), local[:, 2]
     assert radius.max() < 0.045 and height.min() > -0.005 and height.max() < 0.125
     assert item.retrieved[0].size_factor == 1.0
+
+
+@pytest.mark.parametrize("object_id", [BOX, CAN])
+def test_the_pose_of_the_record_is_that_of_the_mesh(result, folder, object_id):
+    item = next(o for o in result.objects if o.object_id == object_id)
+    best = max(item.retrieved, key=lambda each: each.weight)
+    shape = open_prior(folder).load(best.name).shape
+    vertices = transform_points(best.T_cam_object, shape.vertices.astype(np.float64))
+    off = MeshSurface(item.surface.as_trimesh()).nearest(vertices).distance
+    assert off.max() < 0.002
+
+
+def test_placements_weigh_what_they_are_worth_in_the_end(folder, truth):
+    """Whatever they weighed before they were refined and turned; that of the object stays."""
+    prior, frame = open_prior(folder), photograph(truth)
+    retriever = Sure([0.5, 0.5])
+    scene = look_at(frame, Setup(CONFIG, prior=prior, retriever=retriever), retriever)
+    observation = without_samples(scene.frame, BOX)
+    points = np.random.default_rng(0).permutation(observation.points).astype(np.float64)
+    verifier = Verifier(points, scene.frame, scene.image.plane)
+    placer = Placer(scene, observation, verifier, CONFIG.hypotheses, ALONE)
+    (best, *_) = placer.placements([("box", 1.0)], {}).placed
+    aside = similarity(translation=np.array([0.2, 0.0, 0.0])) @ best.T_cam_model
+    both = [replace(best, T_cam_model=aside), best]
+    found = Placements([("box", 1.0)], [2], both, [0.0, 0.0], np.array([0.7, 0.2, 0.1]))
+    settled, _ = placer.settled(found, np.arange(2))
+    assert settled.weights[1] > 0.89
+    assert settled.weights[:2].sum() == pytest.approx(0.9) and settled.unknown == 0.1
+    alone, _ = placer.settled(found, np.array([1]))
+    np.testing.assert_array_equal(alone.weights, found.weights)
 
 
 def uncertainty(item):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from table_scene import placed, stored
@@ -11,7 +13,7 @@ from brrp_cli.methods.placements import Placements
 from brrp_cli.registration.model import search_model
 from brrp_cli.registration.pose_search import Hypothesis
 
-STANDING = placed(0.02, -0.03, 0.5)
+STANDING, ASIDE = placed(0.02, -0.03, 0.5), placed(0.1, 0, 0)
 TO_MIDDLE = similarity(translation=np.array([0, 0, 0.07]))
 
 
@@ -22,7 +24,7 @@ def hypothesis(name, T_cam_mesh, score):
 @pytest.fixture
 def found():
     """Two placements of the box, none of the ball, one of the fruit."""
-    boxes = [hypothesis("box", STANDING, 0.9), hypothesis("box", placed(0.1, 0, 0), 0.6)]
+    boxes = [hypothesis("box", STANDING, 0.9), hypothesis("box", ASIDE, 0.6)]
     fruit = hypothesis("fruit", placed(-0.1, 0, 0), 0.5)
     return Placements(
         chosen=[("box", 0.6), ("ball", 0.2), ("fruit", 0.1)],
@@ -38,10 +40,14 @@ def test_an_object_has_the_weight_of_all_of_its_placements(found):
     assert found.heaviest == pytest.approx(0.6) and found.unknown == 0.25
 
 
-def test_an_object_lies_where_its_best_placement_is(found):
-    box, ball, _ = found.retrieved()
-    assert (box.name, box.probability, box.alignment_score) == ("box", 0.6, 0.9)
-    np.testing.assert_allclose(box.T_cam_mesh, STANDING, atol=1e-6)
+@pytest.mark.parametrize("first, second", [(0.5, 0.1), (0.1, 0.5), (0.3, 0.3)])
+def test_an_object_lies_where_its_heaviest_placement_is(found, first, second):
+    """As its mesh does; the alignment score does not decide."""
+    weights = np.array([first, second, 0.15, 0.25])
+    box, ball, _ = replace(found, weights=weights).retrieved()
+    score, where = (0.9, STANDING) if first >= second else (0.6, ASIDE)
+    assert (box.name, box.probability, box.alignment_score) == ("box", 0.6, score)
+    np.testing.assert_allclose(box.T_cam_mesh, where, atol=1e-6)
     assert ball.T_cam_object is None and ball.T_cam_mesh is None
 
 
