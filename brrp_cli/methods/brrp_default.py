@@ -125,6 +125,8 @@ def reconstruct_by_hypotheses(
             shared[kept] / shared[kept].sum(),
             hypotheses,
             views,
+            # Strays of what a mask has placed would dent it.
+            trusted=mask is None or mask.trust == 1 or found.unknown > 0.5,
             seed=seed,
             device=scene.device,
         )

@@ -30,7 +30,7 @@ from brrp_cli.inference.posterior import LOGISTIC_DEVIATION
 from brrp_cli.methods.earlier_views import ALONE, EarlierViews, Guess
 from brrp_cli.observation.ray_samples import ObjectObservation
 from brrp_cli.observation.sensor_noise import depth_deviation
-from brrp_cli.observation.soft_samples import soft_samples
+from brrp_cli.observation.soft_samples import NO_SAMPLES, soft_samples
 from brrp_cli.observation.support_plane import Plane
 from brrp_cli.registration.pose_covariance import pose_covariance
 from brrp_cli.registration.pose_search import Hypothesis
@@ -77,6 +77,7 @@ def infer_object(
     config: HypothesesConfig,
     views: EarlierViews,
     *,
+    trusted: bool,
     seed: int,
     device: str,
 ) -> tuple[HypothesisPosterior, Guess | None]:
@@ -86,6 +87,7 @@ def infer_object(
     shown : which the completion needs
     wave : metres, as in `reconstruct_by_hypotheses`; weights : (C,) of the shapes and, where there
     is one more, of the completion; views : of earlier frames, none of a frame that stands alone
+    trusted : whether what this frame measured corrects the shapes
     """
     own = shown() if len(shapes) < len(weights) else None
     if own is not None:
@@ -106,7 +108,10 @@ def infer_object(
         means.append(completed)
     stiffness = np.ones(len(means))
     stiffness[: len(shapes)] = config.map.stiffness
-    samples = views.joined(soft_samples(observation, frame, config.map.behind, config.sensor))
+    samples = NO_SAMPLES
+    if trusted:
+        samples = soft_samples(observation, frame, config.map.behind, config.sensor)
+    samples = views.joined(samples)
     deviation = config.sensor.sure * depth_deviation(observation.center[2:], config.sensor)[0]
     posterior = infer_correction(
         Problem(samples, tuple(means), weights, stiffness, deviation, box, wave),

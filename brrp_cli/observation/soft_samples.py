@@ -28,6 +28,9 @@ class SoftSamples:
     measured: Array
 
 
+NO_SAMPLES = SoftSamples(np.zeros((0, 3)), np.zeros(0), np.zeros((0, 3)))
+
+
 def soft_samples(
     observation: ObjectObservation, frame: Frame, distance: float, config: SensorConfig
 ) -> SoftSamples:
