@@ -131,6 +131,8 @@ def table(name: str, rows: list[Row]) -> list[str]:
             [row.scene for row in chosen],
             np.random.default_rng(0),
         )
+        # Of one scene there is no interval.
+        interval = f" [{f_score.low:.3f}, {f_score.high:.3f}]" if np.isfinite(f_score.low) else ""
         cells = [
             name,
             f"{100 * max(low, 0):g} to {100 * high:g} %",
@@ -141,7 +143,7 @@ def table(name: str, rows: list[Row]) -> list[str]:
             f"{1000 * np.nanmean(distances):.2f}, {1000 * np.nanmedian(distances):.2f}"
             if made.any()
             else "-",
-            f"{f_score.value:.3f} [{f_score.low:.3f}, {f_score.high:.3f}]",
+            f"{f_score.value:.3f}{interval}",
             f"{_root_mean([row.printed for row in chosen])}, "
             f"{_root_mean([row.off for row in chosen])}",
         ]
