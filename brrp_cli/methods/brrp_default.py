@@ -79,8 +79,8 @@ def reconstruct_by_hypotheses(
         if trial is not None:
             return told(retrieved=found.retrieved())
         least = scene.config.observation.min_points
-        few = len(points) < least
-        if few and (image.plane is None or found.unknown > 0.5):
+        few, known = len(points) < least, found.unknown <= 0.5
+        if few and (image.plane is None or not known):
             return too_few(object_id, len(points), least)
         like: list[KinHypothesis] = []
         if not few and found.unknown >= hypotheses.kin.least_unknown:
@@ -126,7 +126,7 @@ def reconstruct_by_hypotheses(
             hypotheses,
             views,
             # Strays of what a mask has placed would dent it.
-            trusted=mask is None or mask.trust == 1 or found.unknown > 0.5,
+            trusted=mask is None or mask.trust == 1 or not known,
             seed=seed,
             device=scene.device,
         )
