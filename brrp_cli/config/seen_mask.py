@@ -63,9 +63,8 @@ class SeenMaskConfig:
     bare, spilled : alignment scores against a placement that leaves all of it bare, and that covers
         e - 1 times as much beside it; silhouette : how that is found; by_mask : how the mask
         suggests placements
-    directions : of the image, evenly spread, in which a placed shape reaches as far as the mask, to
-        within `edge_deviation` pixels; edge_width : pixels from the furthest one, and from another
-        object or the border, within which the mask may be cut
+    edge_deviation : pixels, to within which a placed shape reaches as far as the mask, in the
+        directions of `by_mask`; edge_width : from the mask's edge, where points are not trusted
     """
 
     blind: float = share(0.6)
@@ -73,7 +72,6 @@ class SeenMaskConfig:
     spilled: float = 0.3
     silhouette: SilhouetteConfig = field(default_factory=SilhouetteConfig)
     by_mask: MaskPosesConfig = field(default_factory=MaskPosesConfig)
-    directions: int = 16
     edge_deviation: float = 2.0
     edge_width: int = 2
     trusted: int = 100

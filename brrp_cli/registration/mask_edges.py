@@ -11,11 +11,9 @@ from brrp_cli.config.seen_mask import SeenMaskConfig
 from brrp_cli.frames.dilate import dilated, mask_box
 from brrp_cli.frames.frame import BACKGROUND, Frame
 from brrp_cli.geometry import transform_points
+from brrp_cli.registration.mask_loops import NEAREST
 
 Array = NDArray[np.float64]
-
-# Metres; what is nearer to the camera is not seen.
-NEAREST = 0.01
 
 
 @dataclass(frozen=True)
@@ -49,8 +47,9 @@ class MaskEdges:
 
 def mask_edges(frame: Frame, object_id: int, config: SeenMaskConfig) -> MaskEdges:
     """Those of an object of the frame that nothing may cut."""
-    directions = around(config.directions)
-    reach, cut = reach_of(frame, object_id, directions, config.edge_width)
+    by_mask = config.by_mask
+    directions = around(by_mask.directions)
+    reach, cut = reach_of(frame, object_id, directions, by_mask.edge_width)
     return MaskEdges(
         reach[~cut], directions[~cut], frame.K.astype(np.float64), config.edge_deviation
     )

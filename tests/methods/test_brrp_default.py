@@ -194,9 +194,8 @@ def test_no_shape_is_made_of_a_few_points_of_what_the_prior_does_not_hold(folder
     found = reconstruct(frame, open_prior(folder)).objects[0]
     assert found.status == TOO_FEW_POINTS and found.surface is None
     assert "8 valid depth points, 16 are needed" in found.message
-    bare = without_depth(frame, STRANGE)
-    found = reconstruct(bare, open_prior(folder)).objects[0]
-    assert found.status == TOO_FEW_POINTS and found.n_points == 0
+    nothing = reconstruct(without_depth(frame, STRANGE), open_prior(folder)).objects[0]
+    assert (nothing.status, nothing.n_points) == (TOO_FEW_POINTS, 0)
 
 
 def test_retrieval_that_is_wrong_is_outweighed_by_what_the_frame_says(folder, truth):

@@ -31,7 +31,7 @@ def edges_and_shape(name="ell"):
 def test_the_true_shape_reaches_as_far_as_its_mask_to_within_a_pixel():
     edges, vertices = edges_and_shape()
     gap, _ = edges.gaps(truth("ell"), vertices, WHERE[:3, 3])
-    assert len(gap) == CONFIG.directions
+    assert len(gap) == CONFIG.by_mask.directions
     assert np.abs(gap).max() < 1
 
 
