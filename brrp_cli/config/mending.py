@@ -50,11 +50,12 @@ class RegroupConfig:
     most : tries in a round at most
     least_weight : of a stored object in a mask that is not regrouped, and of all of them together
         in one that is not cut
-    sure : of a stored object in a part of a mask, to be taken; whole : in a union of masks, or in
-        one that was left out, and in any from which a mask is grown; half : in each of two parts
-        that make up `both` of a mask
-    explained : part of a tried mask that the object explains as it was placed, at least; within :
-        part of what it explains of all masks that lies in that one
+    sure : of a stored object in a part of a mask, to be taken, and in a union with a mask in which
+        one is recognised; whole : in another union of masks, or in one that was left out, and in
+        any from which a mask is grown; half : in each of two parts that make up `both` of a mask
+    explained : part of a tried mask that the object explains as it was placed, at least, and of
+        each mask of a union with one in which an object is recognised; within : part of what it
+        explains of all masks that lies in that one
     grown : masks made of what an object explains that are tried in a round at most; closing :
         pixels, half the width of gaps in them that are closed; least_share : of such a mask, that
         it takes from another one at least

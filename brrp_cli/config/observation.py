@@ -161,18 +161,35 @@ class BledEdgeConfig:
 
 
 @dataclass(frozen=True)
+class LentPixelsConfig:
+    """Pixels at the edge of a mask that show another object (observation/lent_pixels.py).
+
+    edge : pixels from the edge, within which they lie; alike : metres from the depth of the nearest
+    pixel of another object, at most; apart : from that of the nearest one further inside, at least;
+    reach : pixels to either, at most
+    """
+
+    edge: float = 3.0
+    alike: float = 0.01
+    apart: float = 0.02
+    reach: int = 8
+
+
+@dataclass(frozen=True)
 class StrayConfig:
     """Pixels of a mask that are not its object's (observation/strays.py).
 
     link : metres between the depths of neighbouring pixels of one piece, and of scraps from the
         object; reach : metres in depth between the object and its other pieces; share : of the
-        pixels of the largest piece, which one that is no scrap has; bled : ramps at its upper edge
+        pixels of the largest piece, which one that is no scrap has; bled : ramps at its upper edge;
+        lent : what shows another object
     """
 
     link: float = 0.02
     reach: float = 0.1
     share: float = share(0.02)
     bled: BledEdgeConfig = field(default_factory=BledEdgeConfig)
+    lent: LentPixelsConfig = field(default_factory=LentPixelsConfig)
 
 
 @dataclass(frozen=True)

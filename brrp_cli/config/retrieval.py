@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 from brrp_cli.config.ranges import between, share
 from brrp_cli.config.registration import SearchConfig
-from brrp_cli.config.seen_mask import MaskPosesConfig, SilhouetteConfig
+from brrp_cli.config.seen_mask import LITTLE_DEPTH, MaskPosesConfig, SilhouetteConfig
 
 
 @dataclass(frozen=True)
@@ -32,7 +32,7 @@ class ObservedAppearanceConfig:
     normal_neighbours: int = 30
     in_front: float = 0.01
     reach: int = 2
-    sparse: float = share(0.6)
+    sparse: float = share(LITTLE_DEPTH)
 
 
 @dataclass(frozen=True)
@@ -177,7 +177,7 @@ class AlignmentConfig:
         default_factory=lambda: SearchConfig(fine=2, fine_points=800, fine_steps=8)
     )
     silhouette: SilhouetteConfig = field(default_factory=SilhouetteConfig)
-    blind: float = share(0.6)
+    blind: float = share(LITTLE_DEPTH)
     by_mask: MaskPosesConfig = field(default_factory=MaskPosesConfig)
 
 

@@ -6,6 +6,9 @@ from dataclasses import dataclass, field
 
 from brrp_cli.config.ranges import between, share
 
+# Share of a mask's pixels that have depth, below which the mask says more of an object than depth.
+LITTLE_DEPTH = 0.6
+
 
 @dataclass(frozen=True)
 class MaskPosesConfig:
@@ -67,7 +70,7 @@ class SeenMaskConfig:
         directions of `by_mask`; edge_width : from the mask's edge, where points are not trusted
     """
 
-    blind: float = share(0.6)
+    blind: float = share(LITTLE_DEPTH)
     bare: float = 1.0
     spilled: float = 0.3
     silhouette: SilhouetteConfig = field(default_factory=SilhouetteConfig)

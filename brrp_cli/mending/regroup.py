@@ -27,9 +27,9 @@ def regroup(
     asked: Collection[int] | None = None,
     first_free: int = 1,
 ) -> Reconstruction:
-    """The reconstruction with those other masks of what was not recognised in which a stored object
-    is: the ones that it explains most of, first. What is left of a mask keeps its id, and may be
-    regrouped in the next round.
+    """The reconstruction with those other masks of what was not recognised, and of its neighbours,
+    in which a stored object is: the ones that it explains most of, first. What is left of a mask
+    keeps its id, and may be regrouped in the next round.
 
     aside : (H, W) masks that were left out, 0 = none; asked : ids whose masks may be regrouped,
     None = all; first_free : ids of new objects are this at least
@@ -61,8 +61,9 @@ def _one_round(
     may = [each for each in result.objects if asked is None or each.object_id in asked]
     doubtful = [each.object_id for each in may if not _recognised(each, own.least_weight)]
     whole = [each.object_id for each in result.objects if _is_one(each, own.least_weight)]
+    sure = [each.object_id for each in may if _recognised(each, own.least_weight)]
     tries = Tries(result, prior, again, config)
-    masks = other_masks(frame, doubtful, aside, config, result.seed, whole)
+    masks = other_masks(frame, doubtful, aside, config, result.seed, whole, sure)
     found = tries.found(masks)
     free = np.isin(frame.segmap, doubtful)
     if aside is not None:
@@ -93,13 +94,14 @@ def _is_one(item: ObjectReconstruction, least_weight: float) -> bool:
 def _without_scraps(
     segmap: NDArray[np.int64], named: dict[int, OtherMask], frame: Frame, config: SegmentConfig
 ) -> NDArray[np.int64]:
-    """What is left of a mask that was cut stays with the part that was recognised, where it would
-    be no object: too small, or no more than a rim."""
+    """What is left of a mask that was cut and is too small for an object: its rims stay with the
+    part that was recognised, and the rest, which that part does not explain, is background."""
     segmap = segmap.copy()
     for object_id, mask in named.items():
         for source in mask.of - {object_id}:
             left = segmap == source
-            solid = opened(left, config.mend.opening) & frame.valid
-            if source != BACKGROUND and solid.sum() < config.regroup.least_pixels:
+            solid = opened(left, config.mend.opening)
+            if source != BACKGROUND and (solid & frame.valid).sum() < config.regroup.least_pixels:
                 segmap[left] = object_id
+                segmap[solid] = BACKGROUND
     return segmap

@@ -80,8 +80,17 @@ class Tries:
 
     def sure(self, each: Found) -> bool:
         """Whether the object is beyond doubt there."""
-        own = self.config.regroup
-        return each.weight >= (own.sure if each.mask.cut else own.whole)
+        own, doubted = self.config.regroup, each.mask.cut or each.mask.known
+        sure = each.weight >= (own.sure if doubted else own.whole)
+        return sure and (not each.mask.known or self._explains_all(each))
+
+    def _explains_all(self, each: Found) -> bool:
+        """Whether the object explains most of every mask that it is tried in: one that is
+        recognised takes in nothing that is not its own."""
+        frame = self.result.frame
+        parts = (frame.valid & (frame.segmap == i) for i in each.mask.of)
+        least = self.config.regroup.explained
+        return all((each.explains & part).sum() >= least * part.sum() for part in parts)
 
     def known(self, objects: Sequence[ObjectReconstruction]) -> list[Found]:
         """Those of the frame's objects that are recognised, in the masks that they have."""
@@ -108,6 +117,8 @@ class Tries:
         for each in sorted(found, key=lambda each: -each.weight):
             if each.weight < own.whole or len(more) == own.grown:
                 break
+            if each.mask.known and not self.sure(each):
+                continue
             mask = _grown(each, free, frame, own.closing, own.least_share)
             pixels = mask.mask.sum()
             same = any(
@@ -129,4 +140,4 @@ def _grown(each: Found, free: Mask, frame: Frame, closing: int, least: float) ->
     ids, counts = np.unique(frame.segmap[mask], return_counts=True)
     held = ids[(ids == BACKGROUND) | (counts > least * mask.sum())]
     of = frozenset(int(i) for i in held if i != BACKGROUND)
-    return OtherMask(mask & np.isin(frame.segmap, held), of, cut=True)
+    return OtherMask(mask & np.isin(frame.segmap, held), of, cut=True, known=each.mask.known & of)

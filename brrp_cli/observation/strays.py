@@ -1,11 +1,11 @@
 """Pixels of a mask whose depth is not that of its object: what lies far behind it, or before it,
-and ramps that lead there."""
+ramps that lead there, and other objects beside it."""
 
 from __future__ import annotations
 
 import logging
 import weakref
-from collections.abc import Collection
+from collections.abc import Collection, Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -14,8 +14,10 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from brrp_cli.config.observation import StrayConfig
-from brrp_cli.frames.frame import Frame
+from brrp_cli.frames.dilate import mask_box
+from brrp_cli.frames.frame import BACKGROUND, Frame
 from brrp_cli.observation.bled_edges import bled_pixels
+from brrp_cli.observation.lent_pixels import lent_pixels
 from brrp_cli.spoken import counted
 
 log = logging.getLogger(__name__)
@@ -47,29 +49,33 @@ def without_strays(
     for object_id in frame.object_ids if looked_at is None else looked_at:
         own = frame.valid & (frame.segmap == object_id)
         if own.any():
-            rows, columns = np.nonzero(own)
-            window = np.s_[rows.min() : rows.max() + 1, columns.min() : columns.max() + 1]
-            depth = np.where(own[window], frame.points[..., 2][window], np.nan)
-            bled = bled_pixels(depth, float(frame.K[1, 1]), config.bled)
-            found = stray_pixels(np.where(bled, np.nan, depth), config)
-            stray[window] |= bled | found
-            if bled.any() and (told is None or object_id in told):
-                log.info(
-                    "Object %d: %s of its mask left out, between it and what is behind it",
-                    object_id,
-                    counted(int(bled.sum()), "pixel"),
-                )
-            if found.any() and (told is None or object_id in told):
-                log.info(
-                    "Object %d: %s of its mask left out, far from it in depth",
-                    object_id,
-                    counted(int(found.sum()), "pixel"),
-                )
+            box = mask_box(own, config.lent.reach)
+            for found, why in _left_out(frame, object_id, box, config):
+                stray[box] |= found
+                if found.any() and (told is None or object_id in told):
+                    count = counted(int(found.sum()), "pixel")
+                    log.info("Object %d: %s of its mask left out, %s", object_id, count, why)
     if stray.any():
         points = np.where(stray[..., None], np.float32(np.nan), frame.points)
         frame = replace(frame, points=points)
     _clean[id(frame), config] = frame
     return frame
+
+
+def _left_out(
+    frame: Frame, object_id: int, box: tuple[slice, slice], config: StrayConfig
+) -> Iterator[tuple[NDArray[np.bool_], str]]:
+    """Pixels of an object's mask in a part of the image that are not the object's, and why."""
+    ids = frame.segmap[box]
+    mask, others = ids == object_id, (ids != object_id) & (ids != BACKGROUND)
+    depth = np.where(frame.valid[box], frame.points[box][..., 2], np.nan)
+    bled = bled_pixels(np.where(mask, depth, np.nan), float(frame.K[1, 1]), config.bled)
+    yield bled, "between it and what is behind it"
+    depth = np.where(bled, np.nan, depth)
+    far = stray_pixels(np.where(mask, depth, np.nan), config)
+    yield far, "far from it in depth"
+    depth = np.where(far, np.nan, depth)
+    yield lent_pixels(depth, mask, others, config.lent), "as deep as another object beside it"
 
 
 def stray_pixels(depth: NDArray[np.floating], config: StrayConfig) -> NDArray[np.bool_]:

@@ -26,11 +26,12 @@ Mask = NDArray[np.bool_]
 @dataclass(frozen=True)
 class OtherMask:
     """mask : (H, W); of : the ids of the masks that it is made of, none for what was background;
-    cut : whether of parts of them"""
+    cut : whether of parts of them; known : those of them in which a stored object is recognised"""
 
     mask: Mask
     of: frozenset[int]
     cut: bool = False
+    known: frozenset[int] = frozenset()
 
 
 def other_masks(
@@ -40,13 +41,14 @@ def other_masks(
     config: SegmentConfig,
     seed: int = 0,
     whole: Collection[int] = (),
+    known: Collection[int] = (),
 ) -> list[OtherMask]:
     """Masks of what was left out, `aside` (H, W); unions of these and of the masks `ids` with their
-    neighbours, all of them and two by two, and with those near them in the same colours; and parts
-    of each of both, by its inner boundary and by colour.
-    `config.regroup.most` of them at most.
+    neighbours, all of them and two by two, and with those near them in the same colours; of each of
+    `ids` with a neighbour among `known`; and parts of each of `ids` and of what was left out, by
+    its inner boundary and by colour. `config.regroup.most` of them at most.
 
-    whole : ids of masks that are not cut
+    whole : ids of masks that are not cut; known : in which a stored object is recognised
     """
     own = config.regroup
     both, left_out = frame, list[int]()
@@ -55,6 +57,11 @@ def other_masks(
     groups = [frozenset([i]) for i in left_out] + unions(both, [*ids, *left_out], own)
     found = [
         OtherMask(np.isin(both.segmap, list(group)), group.difference(left_out)) for group in groups
+    ]
+    found += [
+        OtherMask(np.isin(frame.segmap, list(pair)), pair, known=pair.intersection(known))
+        for pair in _near(frame, [*ids, *known], own.reach, own.gap)
+        if len(pair.intersection(known)) == 1
     ]
     may = [*(i for i in ids if i not in whole), *left_out]
     large = [i for i in may if _size(frame, both.segmap == i) >= own.least_cut]

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.ndimage import binary_dilation, distance_transform_edt
 from table_scene import box, in_camera, photograph, placed
 
 from brrp_cli.config import StrayConfig
@@ -86,3 +87,21 @@ def test_a_ramp_at_the_upper_edge_has_no_depth_and_stays_in_the_mask():
     np.testing.assert_array_equal(cleaned.segmap, segmap)
     own = frame.segmap == ID
     assert cleaned.valid[own].mean() > 0.95
+
+
+def test_what_another_object_lends_has_no_depth_and_stays_in_the_mask():
+    front = 4
+    back, before = placed(0.0, 0.0, 0.3), placed(0.15, 0.03, 0.3)
+    frame = photograph({ID: in_camera(box(), back), front: in_camera(box(), before)})
+    edge = (frame.segmap == ID) & binary_dilation(frame.segmap == front, iterations=2)
+    points = frame.points.copy()
+    nearest = distance_transform_edt(
+        frame.segmap != front, return_distances=False, return_indices=True
+    )
+    depth = frame.depth[nearest[0][edge], nearest[1][edge]]
+    assert edge.sum() > 100 and (frame.depth[edge] - depth > 0.02).all()
+    points[edge] *= (depth / points[edge][:, 2])[:, None]
+    cleaned = without_strays(replace(frame, points=points), CONFIG)
+    assert cleaned.valid[edge].mean() < 0.05
+    assert cleaned.valid[(frame.segmap == ID) & ~edge].mean() > 0.99
+    np.testing.assert_array_equal(cleaned.segmap, frame.segmap)
