@@ -8,11 +8,10 @@ from functools import partial
 import numpy as np
 import pytest
 from click.testing import CliRunner
-from painted_retrieval import painted_prior, write_coarse
-from painted_scene import STRANGE, THINGS, photograph
+from regroup_scene import PLACES, STRANGE_ID, taken_for
 from scipy.ndimage import binary_dilation
 
-from brrp_cli import Reconstructor, load_config
+from brrp_cli import Reconstructor
 from brrp_cli.api import reconstruct, try_masks
 from brrp_cli.cli import main
 from brrp_cli.config.mending import RegroupConfig
@@ -26,33 +25,12 @@ from brrp_cli.mending.mend import mend
 from brrp_cli.mending.regroup import regroup
 from brrp_cli.mending.tries import Found, Tries
 from brrp_cli.reconstruction import TOO_FEW_POINTS, Similar
-from brrp_cli.retrieval.appearance import AppearanceRetriever
 from brrp_cli.retrieval.base import one_image
 from brrp_cli.segmentation.other_masks import OtherMask
 
 # The can and the ball share a mask, the box comes in two, the plate was left out.
-PLACES = {"red_box": (-0.16, 0.06), "red_can": (0.1, 0.08), "yellow_ball": (0.1, -0.05)}
-PLATE, STRANGER = (-0.1, -0.18), (0.24, 0.12)
-BOX, OTHER_HALF, BOTH, STRANGE_ID = 1, 2, 3, 5
+BOX, OTHER_HALF, BOTH = 1, 2, 3
 ASIDE = 9
-
-
-@pytest.fixture(scope="module")
-def prior(tmp_path_factory):
-    return painted_prior(tmp_path_factory.mktemp("painted"))
-
-
-@pytest.fixture(scope="module")
-def config_file(tmp_path_factory):
-    return write_coarse(tmp_path_factory.mktemp("config"))
-
-
-@pytest.fixture(scope="module")
-def given(prior, config_file):
-    # One retriever, as in a command: what it saw of a mask counts for all frames of the image.
-    config = load_config(config_file)
-    retriever = AppearanceRetriever(prior, config, 0)
-    return {"prior": prior, "config": config, "retriever": retriever, "workers": 1}
 
 
 @pytest.fixture
@@ -65,13 +43,6 @@ def options(prior, config_file):
 def begun(given):
     """A new session, with what else is told it."""
     return partial(Reconstructor, **{**given, "retriever": "appearance"})
-
-
-@pytest.fixture(scope="module")
-def truth():
-    things = {i: (*THINGS[name], *PLACES[name]) for i, name in enumerate(PLACES, start=1)}
-    things[4] = (*THINGS["green_plate"], *PLATE)
-    return photograph(things | {STRANGE_ID: (*STRANGE, *STRANGER)})
 
 
 @pytest.fixture(scope="module")
@@ -91,11 +62,6 @@ def aside(truth):
 
 
 @pytest.fixture(scope="module")
-def again(given):
-    return Again(partial(reconstruct, **given), partial(try_masks, **given))
-
-
-@pytest.fixture(scope="module")
 def first(given, frame):
     return reconstruct(frame, **given)
 
@@ -108,10 +74,6 @@ def mended(first, prior, again, aside):
 def each_mask(segmap):
     """Whatever their ids are."""
     return {(segmap == i).tobytes() for i in np.unique(segmap) if i}
-
-
-def taken_for(result):
-    return {item.object_id: item.outcome.name for item in result.objects if item.recognised}
 
 
 def test_each_thing_has_a_mask_of_its_own_in_the_end(mended, truth):

@@ -47,6 +47,12 @@ def test_neighbours_are_near_in_depth(apart, near):
     assert bool(unions(frame, [1, 2], CONFIG)) == near
 
 
+def test_what_is_in_doubt_is_tried_with_each_neighbour_that_is_recognised():
+    found = other_masks(row_of_masks(), [2], None, SegmentConfig(), whole=[2], known=[1, 3])
+    assert [(each.of, each.known) for each in found] == [({1, 2}, {1}), ({2, 3}, {3})]
+    assert not other_masks(row_of_masks(), [], None, SegmentConfig(), known=[1, 2, 3])
+
+
 def test_pieces_of_one_colour_hang_together_over_wider_gaps():
     frame = row_of_masks((20, 20))
     rgb = np.full((*frame.shape, 3), 128, np.uint8)
