@@ -147,6 +147,8 @@ class SearchConfig:
     `beaten` behind another model's. Of placements whose surfaces lie within `distinct` metres the
     best is kept, `kept` in all. An object is not placed at all where another one, with a score of
     `explained`, explains what is seen, and P(c|R) is less than a share `unlikely` of that one's.
+    `near` and `tolerance` of `alignment_score` are no less than `waves` standard deviations of the
+    waves that the frame's depth has (observation/sensor_noise.py).
     """
 
     turns: int = 24
@@ -195,6 +197,7 @@ class SearchConfig:
     kept: int = 6
     explained: float = 0.85
     unlikely: float = share(0.05)
+    waves: float = 2.0
     alignment_score: VerificationConfig = field(default_factory=VerificationConfig)
     colour: ColourConfig = field(default_factory=ColourConfig)
     about_itself: TurnConfig = field(default_factory=TurnConfig)

@@ -117,8 +117,6 @@ class AlignmentConfig:
         their silhouettes are held against the mask
     blind : share of a mask's pixels that have depth, below which the mask tells too where objects
         may lie, as `by_mask` says (registration/mask_poses.py)
-    waves : deviations of the waves of the frame's depth (`sensor`), by which the true object may be
-        off
     """
 
     tried: tuple[int, ...] = (8, 16)
@@ -137,7 +135,6 @@ class AlignmentConfig:
     neutral: float = 0.85
     unaligned: float = 0.3
     lowest: float = 0.3
-    waves: float = 2.0
     search: SearchConfig = field(
         default_factory=lambda: SearchConfig(
             turns=12,

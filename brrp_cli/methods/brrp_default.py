@@ -22,7 +22,7 @@ from brrp_cli.observation.ray_samples import ObjectObservation
 from brrp_cli.reconstruction import OK, ObjectReconstruction, Similar
 from brrp_cli.registration.pose_search import Hypothesis
 from brrp_cli.registration.seen_mask import SeenMask, seen_mask
-from brrp_cli.registration.verification import Verifier
+from brrp_cli.registration.verification import Verifier, in_waves
 from brrp_cli.registration.weigh import counted_once
 from brrp_cli.retrieval.base import top_k, unknown
 from brrp_cli.seeds import child_rng
@@ -160,9 +160,10 @@ def reconstruct_by_hypotheses(
 
 
 def _hypotheses(scene: Scene, trial: TrialConfig | None) -> HypothesesConfig:
-    """The configuration; of a trial, one that gives up sooner."""
+    """The configuration, as the frame's waves ask for; of a trial, one that gives up sooner."""
     assert scene.config.hypotheses is not None
     hypotheses = counted_once(scene.config.hypotheses, scene.aligns)
+    hypotheses = replace(hypotheses, search=in_waves(hypotheses.search, scene.image.wave))
     if trial is None:
         return hypotheses
     short = replace(

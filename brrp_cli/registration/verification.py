@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -88,3 +88,18 @@ class Verifier:
         if self.mask is not None:
             like = self.mask.believed(like) - self.mask.against(T, model, config.tolerance)
         return like - config.contradiction * unlike
+
+
+def in_waves(search: SearchConfig, wave: float) -> SearchConfig:
+    """The numbers of a search where depth errs over patches by `wave`, metres: the true object may
+    be further off the points and further before what is behind it. A camera that errs by less than
+    those numbers allow changes nothing."""
+    score, deviation = search.alignment_score, search.waves * wave
+    near = max(score.near, deviation)
+    tolerant = replace(
+        score,
+        near=near,
+        far=score.far * near / score.near,
+        tolerance=max(score.tolerance, deviation),
+    )
+    return replace(search, alignment_score=tolerant)

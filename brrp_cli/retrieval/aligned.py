@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from brrp_cli.config import SearchConfig, VerificationConfig
+from brrp_cli.config import SearchConfig
 from brrp_cli.config.retrieval import AlignmentConfig
 from brrp_cli.frames.frame import Frame
 from brrp_cli.observation.support_plane import Plane
@@ -23,7 +23,7 @@ from brrp_cli.registration.quick_alignment import (
     first_placements,
 )
 from brrp_cli.registration.silhouette import Silhouette, bare_and_spilled, silhouette
-from brrp_cli.registration.verification import Verifier
+from brrp_cli.registration.verification import Verifier, in_waves
 from brrp_cli.retrieval.held_models import HeldModels
 
 # What speaks against placements (b,), from the shares of the mask that they leave bare, and cover
@@ -48,10 +48,7 @@ def seen_part(
     wave : metres, by which the frame's depth errs over patches (observation/sensor_noise.py)
     against : what silhouettes say against placements, in alignment scores
     """
-    search = replace(
-        config.search,
-        alignment_score=tolerant(config.search.alignment_score, config.waves * wave),
-    )
+    search = in_waves(config.search, wave)
     verifier = Verifier(points.astype(np.float64), frame, plane)
     blind = len(points) < config.blind * (frame.segmap == object_id).sum()
     mask = Mask(
@@ -60,18 +57,6 @@ def seen_part(
         blind,
     )
     return SeenPart(models, verifier, mask, search, config, against)
-
-
-def tolerant(score: VerificationConfig, deviation: float) -> VerificationConfig:
-    """The numbers of a score where depth is off by `deviation`, metres: the true object is no
-    further away and no less far in front than that. Sensors that err by less change nothing."""
-    near = max(score.near, deviation)
-    return replace(
-        score,
-        near=near,
-        far=score.far * near / score.near,
-        tolerance=max(score.tolerance, deviation),
-    )
 
 
 @dataclass(frozen=True)
