@@ -59,9 +59,9 @@ def _one_round(
 ) -> Reconstruction:
     frame, own = result.frame, config.regroup
     may = [each for each in result.objects if asked is None or each.object_id in asked]
-    doubtful = [each.object_id for each in may if not _recognised(each, own.least_weight)]
-    whole = [each.object_id for each in result.objects if _is_one(each, own.least_weight)]
     sure = [each.object_id for each in may if _recognised(each, own.least_weight)]
+    doubtful = [each.object_id for each in may if each.object_id not in sure]
+    whole = [each.object_id for each in result.objects if _is_one(each, own.least_weight)]
     tries = Tries(result, prior, again, config)
     masks = other_masks(frame, doubtful, aside, config, result.seed, whole, sure)
     found = tries.found(masks)
@@ -95,7 +95,7 @@ def _without_scraps(
     segmap: NDArray[np.int64], named: dict[int, OtherMask], frame: Frame, config: SegmentConfig
 ) -> NDArray[np.int64]:
     """What is left of a mask that was cut and is too small for an object: its rims stay with the
-    part that was recognised, and the rest, which that part does not explain, is background."""
+    part that was recognised, and the rest is background."""
     segmap = segmap.copy()
     for object_id, mask in named.items():
         for source in mask.of - {object_id}:

@@ -85,11 +85,11 @@ class Tries:
         return sure and (not each.mask.known or self._explains_all(each))
 
     def _explains_all(self, each: Found) -> bool:
-        """Whether the object explains most of every mask that it is tried in: one that is
-        recognised takes in nothing that is not its own."""
-        frame = self.result.frame
-        parts = (frame.valid & (frame.segmap == i) for i in each.mask.of)
-        least = self.config.regroup.explained
+        """Whether the object explains most of what is tried of every mask: one that is recognised
+        takes in nothing that is not its own."""
+        frame, least = self.result.frame, self.config.regroup.explained
+        seen = each.mask.mask & frame.valid
+        parts = (seen & (frame.segmap == i) for i in each.mask.of)
         return all((each.explains & part).sum() >= least * part.sum() for part in parts)
 
     def known(self, objects: Sequence[ObjectReconstruction]) -> list[Found]:
