@@ -61,7 +61,8 @@ class KinConfig:
     standard deviations, in halves of the box: `bend_round` where what is round stays round,
     `bend_even` where two sides that are alike stay alike, `bend_any` of all others; `bend_lean` :
     radians; `bend_steepest` : of the bend's slopes, so that space does not fold. One of which a
-    share over `most_through` still stands `through` metres before what was measured is left out.
+    share over the first of `most_through` still stands `through` metres before what was measured is
+    left out; of a hollow shape that the camera looks into, over the second: cameras miss rims.
     Hypotheses: of the best `kept` fits the best `hypotheses` that lie `distinct` metres apart, at
     every `distinct_step`-th point. Their weight is a logistic function of the best score, a half at
     `convincing`, with the slope `sharpness`. Of a hollow shape, whose share of hollow space reaches
@@ -145,7 +146,7 @@ class KinConfig:
     bend_lean: float = 0.1
     bend_steepest: float = share(0.6)
     through: float = 0.01
-    most_through: float = share(0.05)
+    most_through: tuple[float, float] = (0.05, 0.1)
     out_pull: float = 5.0
     aside: tuple[float, float] = (0.001, 0.06)
     aside_steps: int = 14

@@ -85,7 +85,8 @@ def kin_hypotheses(
         for row, name in zip(chosen, names, strict=True)
     ]
     together = shares[shares >= kin.least_share].sum()
-    kept = [k for k, each in enumerate(found) if each.through <= kin.most_through]
+    most = _most_through(library.hollow[fits.placements.stance[chosen]], into, kin)
+    kept = [k for k, each in enumerate(found) if each.through <= most[k]]
     if not kept:
         return []
     chosen, names, found = chosen[kept], [names[k] for k in kept], [found[k] for k in kept]
@@ -152,6 +153,14 @@ def bent_shares(
     relative = softmax(-config.sharpness * cost)
     relative = np.where(relative >= config.least_share, relative, 0)
     return np.asarray(together * relative / relative.sum())
+
+
+def _most_through(hollow: NDArray[np.floating], into: float, config: KinConfig) -> Array:
+    """The shares (k,) of shapes that may stand before what was measured. Where a camera looks into
+    a bowl, its depth may run from the floor to the table as if no wall were between."""
+    closed, opened = config.most_through
+    looked = np.interp(into, config.opening, [0, 1])
+    return np.asarray(closed + (opened - closed) * looked * _walls(hollow, config))
 
 
 def _walls(hollow: NDArray[np.floating], config: KinConfig) -> Array:
