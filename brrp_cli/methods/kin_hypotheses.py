@@ -85,7 +85,7 @@ def kin_hypotheses(
         for row, name in zip(chosen, names, strict=True)
     ]
     together = shares[shares >= kin.least_share].sum()
-    most = _most_through(library.hollow[fits.placements.stance[chosen]], into, kin)
+    most = _most_through(found, library.hollow[fits.placements.stance[chosen]], into, kin)
     kept = [k for k, each in enumerate(found) if each.through <= most[k]]
     if not kept:
         return []
@@ -155,11 +155,15 @@ def bent_shares(
     return np.asarray(together * relative / relative.sum())
 
 
-def _most_through(hollow: NDArray[np.floating], into: float, config: KinConfig) -> Array:
+def _most_through(
+    found: Sequence[BentShape], hollow: NDArray[np.floating], into: float, config: KinConfig
+) -> Array:
     """The shares (k,) of shapes that may stand before what was measured. Where a camera looks into
-    a bowl, its depth may run from the floor to the table as if no wall were between."""
+    a bowl, its depth may run from the floor to the table as if no wall were between. Else the bowl
+    fits well: a shape that does not is another one."""
     closed, opened = config.most_through
-    looked = np.interp(into, config.opening, [0, 1])
+    fits = np.array([each.cost for each in found]) <= config.most_cost[1]
+    looked = np.interp(into, config.opening, [0, 1]) * fits
     return np.asarray(closed + (opened - closed) * looked * _walls(hollow, config))
 
 
