@@ -63,7 +63,7 @@ class KinConfig:
     radians; `bend_steepest` : of the bend's slopes, so that space does not fold. One of which a
     share over the first of `most_through` still stands `through` metres before what was measured is
     left out; of a hollow shape that the camera looks into and that costs no more than the second of
-    `most_cost`, over the second: cameras miss rims.
+    `most_cost`, over the second where the camera mixes depths (`mixed_edges`): it misses rims.
     Hypotheses: of the best `kept` fits the best `hypotheses` that lie `distinct` metres apart, at
     every `distinct_step`-th point. Their weight is a logistic function of the best score, a half at
     `convincing`, with the slope `sharpness`. Of a hollow shape, whose share of hollow space reaches

@@ -94,6 +94,7 @@ def reconstruct_by_hypotheses(
                 seed,
                 views.points(),
                 views.depths(),
+                image.mixing,
             )
 
     @cache

@@ -50,12 +50,13 @@ def kin_hypotheses(
     seed: int,
     others: Sequence[NDArray[np.floating]] = (),
     depths: Sequence[OtherDepth] = (),
+    mixing: int = 0,
 ) -> list[KinHypothesis]:
     """The best fits that differ, whose shares leave to the completion what speaks against them.
 
     points : (n, 3) observed, metres, camera frame. None where shapes have no plane to stand on, and
     where no fit is convincing. others : the same of other views of it, and `depths` of
-    these
+    these; mixing : pixels over which the camera mixes both sides of a jump of depth
     """
     kin = config.kin
     if plane is None or not kin.enabled:
@@ -85,13 +86,14 @@ def kin_hypotheses(
         for row, name in zip(chosen, names, strict=True)
     ]
     together = shares[shares >= kin.least_share].sum()
-    most = _most_through(found, library.hollow[fits.placements.stance[chosen]], into, kin)
+    cost = np.array([each.cost for each in found])
+    hollow = library.hollow[fits.placements.stance[chosen]]
+    most = most_through(cost, hollow, into if mixing else 0.0, kin)
     kept = [k for k, each in enumerate(found) if each.through <= most[k]]
     if not kept:
         return []
     chosen, names, found = chosen[kept], [names[k] for k in kept], [found[k] for k in kept]
-    cost = np.array([each.cost for each in found])
-    hollow = library.hollow[fits.placements.stance[chosen]]
+    cost, hollow = cost[kept], hollow[kept]
     relative = bent_shares(cost, hollow, into, kin)
     return [
         _hypothesis(name, each, float(share), float(walls), evidence, config)
@@ -155,15 +157,17 @@ def bent_shares(
     return np.asarray(together * relative / relative.sum())
 
 
-def _most_through(
-    found: Sequence[BentShape], hollow: NDArray[np.floating], into: float, config: KinConfig
+def most_through(
+    cost: NDArray[np.floating], hollow: NDArray[np.floating], into: float, config: KinConfig
 ) -> Array:
-    """The shares (k,) of shapes that may stand before what was measured. Where a camera looks into
-    a bowl, its depth may run from the floor to the table as if no wall were between. Else the bowl
-    fits well: a shape that does not is another one."""
+    """The shares (k,) of the surface of bent shapes that may stand before what was measured.
+
+    cost, hollow : (k,) of each; into : how far a camera that mixes depths looks into the object. Its
+    depth may run from the floor of a bowl to the table as if no wall were between. The rest of the
+    bowl fits well: a shape that does not is another one.
+    """
     closed, opened = config.most_through
-    fits = np.array([each.cost for each in found]) <= config.most_cost[1]
-    looked = np.interp(into, config.opening, [0, 1]) * fits
+    looked = np.interp(into, config.opening, [0, 1]) * (cost <= config.most_cost[1])
     return np.asarray(closed + (opened - closed) * looked * _walls(hollow, config))
 
 

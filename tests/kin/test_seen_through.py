@@ -13,6 +13,7 @@ from brrp_cli.config import preset
 from brrp_cli.geometry import transform_points
 from brrp_cli.kin.evidence import gather
 from brrp_cli.kin.ways_out import seen_through
+from brrp_cli.methods.kin_hypotheses import most_through
 from brrp_cli.shapes import solids
 
 ID = 5
@@ -35,6 +36,15 @@ def test_what_stands_before_what_was_measured_is_seen_through():
     assert seen_through(before, evidence, 0.005) == 0.75
     assert seen_through(before, evidence, 10.0) == 0
     assert seen_through(before[:1], evidence, 0.005) == 0, "inside"
+
+
+def test_a_bowl_that_fits_may_stand_before_more_where_the_camera_looks_into_it():
+    few, many = KIN.most_through
+    well, badly = 0.9 * KIN.most_cost[1], 1.1 * KIN.most_cost[1]
+    cost, hollow = np.array([well, badly, well]), np.array([1.0, 1.0, 0.0])
+    closed, opened = KIN.opening
+    np.testing.assert_allclose(most_through(cost, hollow, opened, KIN), [many, few, few])
+    np.testing.assert_allclose(most_through(cost, hollow, closed, KIN), few)
 
 
 def leaning_bowl():
