@@ -162,9 +162,9 @@ def most_through(
 ) -> Array:
     """The shares (k,) of the surface of bent shapes that may stand before what was measured.
 
-    cost, hollow : (k,) of each; into : how far a camera that mixes depths looks into the object. Its
-    depth may run from the floor of a bowl to the table as if no wall were between. The rest of the
-    bowl fits well: a shape that does not is another one.
+    cost, hollow : (k,) of each; into : how far a camera that mixes depths looks into the object.
+    Its depth may run from the floor of a bowl to the table as if no wall were between. The rest of
+    the bowl fits well: a shape that does not is another one.
     """
     closed, opened = config.most_through
     looked = np.interp(into, config.opening, [0, 1]) * (cost <= config.most_cost[1])
