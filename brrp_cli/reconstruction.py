@@ -191,8 +191,8 @@ class ObjectReconstruction:
     ----------
     status : "ok", or why there is no surface: "too_few_points", "no_surface", "failed"
     message : for people; may also qualify an "ok"
-    n_points : valid observed points; observed : (n, 3) those points, metres, camera frame;
-    center : (3,) centre of their bounding box
+    n_points : valid observed points; observed : (n, 3) those points, and of earlier frames of a
+    stream, metres, camera frame; center : (3,) centre of the box that bounds the former
     similar : what it is like, should it be none of them, heaviest first
     unknown_weight : of that in the posterior; None where it has none
     posterior, surface : None unless the object got that far

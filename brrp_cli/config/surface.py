@@ -18,6 +18,8 @@ class SurfaceConfig:
     cubes on a grid of about `nodes` nodes, whose spacing in metres lies between `finest` and
     `spacing`.
     most_apart : metres; how far another hypothesis' surface counts as apart, for the uncertainty
+    guessed : of the uncertainty of what is no stored object's, metres for a metre from the nearest
+    observed point
     around_nodes : of the grid on which the confidence surface around a stored mesh is found, whose
     spacing is `around_finest` metres at least
     fidelity : metres, standard deviation of a stored mesh from its object; pose_share : of what the
@@ -57,6 +59,7 @@ class SurfaceConfig:
     wall_share: float = share(0.4)
     steps: int = 17
     most_apart: float = 0.05
+    guessed: float = share(0.2)
     fidelity: float = 0.00025
     pose_share: float = share(0.9)
     band_draws: int = 4_000

@@ -110,6 +110,12 @@ class HypothesisPosterior:
         mine = [isinstance(m, PlacedShape) and m.taken_for == best for m in self.means]
         return int(np.argmax(np.where(mine, self.weights, -1)))
 
+    @property
+    def guessed(self) -> float:
+        """Weight of what is no stored object as it is: kin and completed shapes."""
+        known = [isinstance(m, PlacedShape) and not m.kin for m in self.means]
+        return float(self.weights[~np.array(known)].sum())
+
     def object_weight(self, number: int) -> float:
         """Weight of all placements of the object that hypothesis `number` places, or of all kin."""
         name = getattr(self.means[number], "taken_for", None)

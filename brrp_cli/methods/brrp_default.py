@@ -68,7 +68,7 @@ def reconstruct_by_hypotheses(
         status=OK,
         n_points=len(observation.points),
         center=observation.center,
-        observed=observation.points,
+        observed=np.concatenate([observation.points, *views.points()]),
         unknown_probability=unknown(believed),
         seconds=seconds,
     )

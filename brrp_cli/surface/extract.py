@@ -13,6 +13,7 @@ from brrp_cli.finite import check_finite
 from brrp_cli.inference.hypothesis_posterior import HypothesisPosterior
 from brrp_cli.reconstruction import Axes, OccupancyPosterior, Surface
 from brrp_cli.surface.connect import near_observed, one_piece
+from brrp_cli.surface.guessed import with_guesses
 from brrp_cli.surface.stored_mesh import along_normals, moved_to_level, placed, spread_of_all
 
 # How far, at least, the occupancy of what is inside lies above the level: 10 micrometres.
@@ -53,6 +54,7 @@ def extract_surface(
             # Walls of several kin that miss each other have no surface in common.
             most = np.hypot(moved.deviation, 2 * config.farthest).astype(np.float32)
             deviation = np.minimum(deviation, most)
+            deviation = with_guesses(deviation, moved.vertices, observed, posterior, config.guessed)
         check_finite("The surface", vertices=moved.vertices, uncertainty=deviation)
         # Kin are off by more; a grid would lose their walls, and what they are taken for.
         if explained.kin or moved.off <= config.most_off:
@@ -72,6 +74,8 @@ def extract_surface(
     if found is None:
         return None
     uncertainty = posterior.surface_uncertainty(found.vertices)
+    if isinstance(posterior, HypothesisPosterior):
+        uncertainty = with_guesses(uncertainty, found.vertices, observed, posterior, config.guessed)
     check_finite("The surface", vertices=found.vertices, uncertainty=uncertainty)
     return Surface(found.vertices, found.faces, uncertainty, posterior.surface_unit)
 

@@ -33,7 +33,7 @@ from brrp_cli.registration.model import search_model
 from brrp_cli.registration.pose_search import Hypothesis, search
 from brrp_cli.registration.refined import refined
 from brrp_cli.registration.scale_scan import observed_cloud
-from brrp_cli.registration.verification import Verifier
+from brrp_cli.registration.verification import Verifier, in_waves
 from brrp_cli.registration.weigh import counted_once, judged
 from brrp_cli.retrieval.base import knows_depth, top_k, unknown
 from brrp_cli.retrieval.choose import choose_retriever
@@ -93,6 +93,7 @@ def collect(
     seen = observe(cleaned, config.observation, 0)
     noise = pixel_noise(cleaned, seen.plane, hypotheses.sensor)
     wave = wave_deviation(cleaned, seen.plane, hypotheses.sensor)
+    hypotheses = replace(hypotheses, search=in_waves(hypotheses.search, wave))
     masks = []
     for number, observation in seen.objects.items():
         mine = frame.segmap == number
