@@ -182,11 +182,13 @@ class StrayConfig:
     link : metres between the depths of neighbouring pixels of one piece, and of scraps from the
         object; reach : metres in depth between the object and its other pieces; share : of the
         pixels of the largest piece, which one that is no scrap has; bled : ramps at its upper edge;
-        lent : what shows another object
+        lent : what shows another object; told : part of a mask's pixels with depth, from which on a
+        message tells that they are left out
     """
 
     link: float = 0.02
     reach: float = 0.1
+    told: float = share(0.02)
     share: float = share(0.02)
     bled: BledEdgeConfig = field(default_factory=BledEdgeConfig)
     lent: LentPixelsConfig = field(default_factory=LentPixelsConfig)

@@ -53,8 +53,11 @@ def without_strays(
             for found, why in _left_out(frame, object_id, box, config):
                 stray[box] |= found
                 if found.any() and (told is None or object_id in told):
+                    # A few pixels at the edge are as good as always lost.
+                    many = found.sum() >= config.told * own.sum()
                     count = counted(int(found.sum()), "pixel")
-                    log.info("Object %d: %s of its mask left out, %s", object_id, count, why)
+                    text = "Object %d: %s of its mask left out, %s"
+                    log.log(logging.INFO if many else logging.DEBUG, text, object_id, count, why)
     if stray.any():
         points = np.where(stray[..., None], np.float32(np.nan), frame.points)
         frame = replace(frame, points=points)

@@ -1,5 +1,6 @@
 """Pixels that their mask holds by mistake, on depth images whose parts are known."""
 
+import logging
 from dataclasses import replace
 
 import numpy as np
@@ -105,3 +106,14 @@ def test_what_another_object_lends_has_no_depth_and_stays_in_the_mask():
     assert cleaned.valid[edge].mean() < 0.05
     assert cleaned.valid[(frame.segmap == ID) & ~edge].mean() > 0.99
     np.testing.assert_array_equal(cleaned.segmap, frame.segmap)
+
+
+@pytest.mark.parametrize("part, told", [(0.01, False), (0.2, True)])
+def test_a_message_tells_of_what_is_more_than_a_few_pixels(caplog, part, told):
+    frame = photograph({ID: in_camera(box(), placed(0.0, 0.0, 0.3))})
+    own = np.argwhere(frame.segmap == ID)
+    points = frame.points.copy()
+    points[tuple(own[: int(part * len(own))].T)] *= 3.0
+    with caplog.at_level(logging.INFO, logger="brrp_cli"):
+        without_strays(replace(frame, points=points), StrayConfig(told=0.05))
+    assert [f"Object {ID}: " in message for message in caplog.messages] == [True] * told

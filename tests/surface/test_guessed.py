@@ -1,4 +1,4 @@
-"""The uncertainty of what is guessed grows with the way to what was seen; known shapes keep theirs."""
+"""What is guessed is the less certain, the further it is from what was seen; the rest is not."""
 
 from __future__ import annotations
 
@@ -26,7 +26,9 @@ NOTHING, FIFTH = SurfaceConfig(guessed=0.0), SurfaceConfig(guessed=0.2)
 
 @pytest.fixture(scope="module")
 def block():
-    return at(trimesh.creation.box(SIDES), similarity(1.0, np.eye(3), CENTER), name="b", width=0.001)
+    return at(
+        trimesh.creation.box(SIDES), similarity(1.0, np.eye(3), CENTER), name="b", width=0.001
+    )
 
 
 @pytest.fixture(scope="module")
