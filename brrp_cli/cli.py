@@ -13,6 +13,7 @@ from contextlib import contextmanager
 import click
 
 from brrp_cli.errors import BrrpError, unexpected
+from brrp_cli.memory import one_heap
 from brrp_cli.nearest import nearest
 from brrp_cli.spoken import command_line
 from brrp_cli.stop import sigterm_raises, stopped
@@ -133,6 +134,7 @@ class LazyGroup(click.Group):
 
     def invoke(self, ctx: click.Context) -> object:
         """Run; an error becomes one message on stderr and its exit code, and so does a stop."""
+        one_heap()
         try:
             with sigterm_raises(), command_line(), _seldom_collected():
                 return super().invoke(ctx)

@@ -9,6 +9,7 @@ from multiprocessing.connection import Connection
 from typing import Any
 
 from brrp_cli.errors import BrrpError, unexpected
+from brrp_cli.memory import one_heap
 from brrp_cli.threads import one_thread_for_good
 
 # Ctrl-C goes to all processes of a terminal, and the one that asked ends the others. That comes
@@ -23,6 +24,7 @@ def serve() -> None:
     """Tasks that come through the pipe whose number is the first argument; the others name modules
     to be imported before. Ends where the other end of the pipe is closed, be it by the death of the
     process that held it."""
+    one_heap()
     pipe = Connection(int(sys.argv[1]))
     for module in sys.argv[2:]:
         import_module(module)
