@@ -138,16 +138,18 @@ class MeanConfig:
 
     A placed shape is -(signed distance) / width, limited to +-limit, with distances that are exact
     within `exact` metres of its surface; an alignment score under `sure` widens it by `doubt`
-    metres for each unit. An object that none explains is completed on a grid of about `nodes` nodes
-    by a network, which is evaluated at every node where the coarse ones around are not all
-    `beyond_doubt`; about what is seen of it its logit is a `ramp` as steep as `shell_logit` says,
-    for `shell` metres, or `shell_nodes` of the grid's spacings where these are longer. Space is
-    empty that lies more than `carve_depth` in front of the measured depth, or `carve_plane` below
-    the plane, or less than `carve_behind` behind what is no object's and more than `carve_pixels`
-    from the mask.
+    metres for each unit. An object that none explains is completed by a network on a grid of about
+    `nodes` nodes, or `minor_nodes` where that weighs less than `minor`. The network is evaluated at
+    every node where the coarse ones around are not all `beyond_doubt`; about what is seen of it its
+    logit is a `ramp` as steep as `shell_logit` says, for `shell` metres, or `shell_nodes` of the
+    grid's spacings where these are longer. Space is empty that lies more than `carve_depth` in
+    front of the measured depth, or `carve_plane` below the plane, or less than `carve_behind`
+    behind what is no object's and more than `carve_pixels` from the mask.
     """
 
     nodes: int = 200_000
+    minor: float = share(0.1)
+    minor_nodes: int = 25_000
     width: float = 0.0005
     sure: float = 0.9
     exact: float = 0.004

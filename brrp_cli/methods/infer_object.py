@@ -104,7 +104,9 @@ def infer_object(
     means: list[MeanFunction] = list(shapes)
     guess = None
     if own is not None:
-        completed, guess = _completed(own, box, plane, config.mean, views)
+        minor = weights[-1] < config.mean.minor
+        nodes = config.mean.minor_nodes if minor else config.mean.nodes
+        completed, guess = _completed(own, box, plane, replace(config.mean, nodes=nodes), views)
         means.append(completed)
     stiffness = np.ones(len(means))
     stiffness[: len(shapes)] = config.map.stiffness
