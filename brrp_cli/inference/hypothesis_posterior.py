@@ -111,7 +111,7 @@ class HypothesisPosterior:
         return int(np.argmax(np.where(mine, self.weights, -1)))
 
     @property
-    def guessed(self) -> float:
+    def guessed_weight(self) -> float:
         """Weight of what is no stored object as it is: kin and completed shapes."""
         known = [isinstance(m, PlacedShape) and not m.kin for m in self.means]
         return float(self.weights[~np.array(known)].sum())

@@ -24,8 +24,9 @@ def with_guesses(
     deviation : (n,) metres, by the hypotheses, at vertices (n, 3), metres, camera frame; observed :
     (m, 3); by_distance : metres for a metre from the nearest of these, of what is guessed alone
     """
-    if posterior.guessed == 0:
+    weight = posterior.guessed_weight
+    if weight == 0:
         return deviation
     away, _ = import_library("scipy.spatial").cKDTree(observed).query(vertices)
-    added = by_distance * np.sqrt(posterior.guessed) * away
+    added = by_distance * np.sqrt(weight) * away
     return np.hypot(deviation, added).astype(np.float32)
