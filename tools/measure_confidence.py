@@ -36,7 +36,9 @@ from brrp_cli.prior.store import Prior, open_prior
 from brrp_cli.raycast import surface_scene
 from brrp_cli.reconstruction import ObjectReconstruction, Reconstruction
 from brrp_cli.seeds import child_rng
+from brrp_cli.surface.around_guess import Free
 from brrp_cli.surface.confidence import Empty, confidence_surface
+from brrp_cli.surface.free_space import free_balls
 
 CONFIDENCES = (0.5, 0.8, 0.9, 0.95, 0.99)
 POINTS = 4_000
@@ -85,6 +87,7 @@ def measure(arguments: argparse.Namespace) -> None:
             rng = child_rng(0, "coverage", scene.name, item.object_id)
             surface = np.asarray(sample_surface(mesh, POINTS, rng))
             empty = partial(_empty, result, item.object_id)
+            free = partial(free_balls, frame=result.frame, plane=result.plane, config=MeanConfig())
             rows.append(
                 {
                     "scene": scene.name,
@@ -94,7 +97,7 @@ def measure(arguments: argparse.Namespace) -> None:
                     "stored": _stored(prior, true.name),
                     "status": item.status,
                     "unknown_weight": item.unknown_weight,
-                    "found": _coverage(item, surface, arguments.margin / 1000, empty),
+                    "found": _coverage(item, surface, arguments.margin / 1000, empty, free),
                 }
             )
         with arguments.output.open("a") as stream:
@@ -107,7 +110,7 @@ def _stored(prior: Prior | None, name: str) -> bool:
 
 
 def _coverage(
-    item: ObjectReconstruction, points: np.ndarray, margin: float, empty: Empty
+    item: ObjectReconstruction, points: np.ndarray, margin: float, empty: Empty, free: Free
 ) -> list[dict[str, float]]:
     """A row for each confidence; empty without a posterior."""
     if item.posterior is None or item.observed is None:
@@ -117,7 +120,7 @@ def _coverage(
     rows = []
     for confidence in CONFIDENCES:
         region = confidence_surface(
-            item.posterior, item.observed, confidence, config, margin, empty
+            item.posterior, item.observed, confidence, config, margin, empty, free
         )
         if region is None:
             continue

@@ -22,6 +22,9 @@ class SurfaceConfig:
     observed point
     around_nodes : of the grid on which the confidence surface around a stored mesh is found, whose
     spacing is `around_finest` metres at least
+    around_seen : metres by which the region that holds what is no stored object's goes beyond what
+    was observed, and beyond what the posterior asks for; there `around_guessed` metres more for
+    each metre that this lies from the nearest observed point, `around_most` in all at most
     fidelity : metres, standard deviation of a stored mesh from its object; pose_share : of what the
     covariance of its pose says, that counts; band_draws : of the pose, from which the width of the
     band around it follows, looked at in `band_vertices` vertices
@@ -66,6 +69,9 @@ class SurfaceConfig:
     band_vertices: int = 300
     around_nodes: int = 1_000_000
     around_finest: float = 0.001
+    around_seen: float = 0.01
+    around_guessed: float = 1.0
+    around_most: float = 0.05
     free_turns: int = 3
     neighbours: float = 1.0
     turn_step: float = 0.25

@@ -10,9 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brrp_cli.completion.completed_mean import empty_space
-from brrp_cli.config import MeanConfig
+from brrp_cli.config import MeanConfig, StrayConfig
 from brrp_cli.errors import ResultError
 from brrp_cli.geometry import IMAGE_UP, similarity, transform_points
+from brrp_cli.observation.strays import without_strays
 from brrp_cli.observation.support_plane import Plane
 from brrp_cli.planning.body import Body, body_axes, body_pose, mass_and_inertia
 from brrp_cli.planning.decompose import Solid, parts_of
@@ -22,6 +23,7 @@ from brrp_cli.reconstruction import Surface
 from brrp_cli.results.read import StoredResult
 from brrp_cli.segmentation.furniture import Furniture, furniture, segmentation_of
 from brrp_cli.surface.confidence import ConfidenceSurface, confidence_surface
+from brrp_cli.surface.free_space import free_balls
 
 if TYPE_CHECKING:
     import trimesh
@@ -147,16 +149,22 @@ def furniture_around(stored: StoredResult) -> Furniture:
 def _region(
     stored: StoredResult, object_id: int, confidence: float, margin: float
 ) -> ConfidenceSurface:
+    frame, plane, config = stored.frame, stored.plane_cam, MeanConfig()
+
     def empty(points: NDArray[np.float64]) -> NDArray[np.bool_]:
-        return empty_space(points, stored.frame, object_id, stored.plane_cam, MeanConfig())
+        return empty_space(points, frame, object_id, plane, config)
+
+    def free(points: NDArray[np.float64], radius: float) -> NDArray[np.bool_]:
+        return free_balls(points, radius, frame, plane, config)
 
     found = confidence_surface(
         stored.posteriors[object_id],
-        stored.frame.object_points(object_id),
+        without_strays(frame, StrayConfig(), (), [object_id]).object_points(object_id),
         confidence,
         stored.surface_config,
         margin,
         empty,
+        free,
     )
     if found is None:
         raise ResultError(

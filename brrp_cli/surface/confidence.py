@@ -22,14 +22,18 @@ all vertices at once with the given probability when the pose is drawn from its 
 simultaneous confidence band), and what the stored mesh itself may be off. Where the object may as
 well be turned about itself, the band reaches as far as those placements do.
 
-The posterior is what it is: where it is too sure, so is C_t. A margin d grows C_t beyond it, into
+The posterior is what it is: where it is too sure, so is C_t, and of what no stored object explains
+it is. What all hypotheses have wrong none of them tells, and that grows with the way to what was
+seen. There the region goes beyond C_t by what such shapes were found to be off (around_guess.py).
+
+A margin d grows any region beyond it, into
 {x outside of C_t : distance to C_t <= d and x was not seen to be empty}.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,6 +45,7 @@ from brrp_cli.inference.particles import particle_shares, particle_volumes
 from brrp_cli.inference.placed_shape import PlacedShape
 from brrp_cli.reconstruction import Axes, OccupancyPosterior
 from brrp_cli.seeds import child_rng
+from brrp_cli.surface.around_guess import Free, grown_by_guess, widened
 from brrp_cli.surface.around_mesh import (
     around_axes,
     beyond_reach,
@@ -99,12 +104,15 @@ def confidence_surface(
     config: SurfaceConfig,
     margin: float = 0.0,
     empty: Empty | None = None,
+    free: Free | None = None,
 ) -> ConfidenceSurface | None:
     """The boundary of the smallest C_t that holds the object with probability `confidence`.
 
     observed : (n, 3) points of the object, metres, camera frame. As with the mesh, parts that no
     observed point is near are dropped. None where nothing is left.
     margin : metres by which C_t is grown where `empty` does not forbid it
+    free : where a ball was seen to be empty; with it, what is guessed is grown by as much as such
+    guesses were found to be off. A method that has one guess and no hypotheses is taken at its word
     """
     if isinstance(posterior, HypothesisPosterior) and posterior.dominant is not None:
         around = _around_stored_mesh(
@@ -122,15 +130,21 @@ def confidence_surface(
     level = min(level, config.level)
     mean = np.tensordot(shares, volumes, axes=1)
     found = level_set(mean, axes, observed, level, config)
-    if found is not None and margin > 0:
+    bounded = not _at_edge(mean >= level)
+    guessed = isinstance(posterior, HypothesisPosterior)
+    if found is not None and ((guessed and free is not None) or margin > 0):
         # In units of the level, so that the surface of C_t stays where it may not grow.
-        grown, wider = _grown(mean / level, axes, margin, config.spacing, empty)
-        found = level_set(grown, wider, observed, 1.0, config)
+        region = mean / level
+        if guessed and free is not None:
+            region, axes = grown_by_guess(region, axes, observed, free, config)
+            # What was observed is the object's, in as many pieces as it was seen.
+            config = replace(config, one_piece=False)
+        if margin > 0:
+            region, axes = _grown(region, axes, margin, config.spacing, empty)
+        found = level_set(region, axes, observed, 1.0, config)
     if found is None:
         return None
-    return ConfidenceSurface(
-        found.vertices, found.faces, confidence, level, bounded=not _at_edge(mean >= level)
-    )
+    return ConfidenceSurface(found.vertices, found.faces, confidence, level, bounded)
 
 
 def _around_stored_mesh(
@@ -217,14 +231,11 @@ def _grown(
     given one is; nodes that are `empty` keep their value."""
     from scipy.ndimage import distance_transform_edt
 
-    cells = int(np.ceil(margin / spacing)) + 1
-    steps = spacing * np.arange(1, cells + 1)
-    x, y, z = (np.concatenate([a[0] - steps[::-1], a, a[-1] + steps]) for a in axes)
-    volume = np.pad(volume.astype(np.float64), cells)
+    volume, axes = widened(volume, axes, margin)
     distance = distance_transform_edt(volume < 1) * spacing
     may_grow = (distance > 0) & (distance < margin + spacing)
     if empty is not None:
-        nodes = np.stack(np.meshgrid(x, y, z, indexing="ij"), axis=-1)
+        nodes = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
         may_grow[may_grow] = ~empty(nodes[may_grow])
     grown = np.where(may_grow, np.maximum(volume, 1 + (margin - distance) / spacing), volume)
-    return grown, (x, y, z)
+    return grown, axes

@@ -111,11 +111,7 @@ def level_set(
 
     origin = np.array([axis[0] for axis in axes])
     spacing = float(axes[0][1] - axes[0][0])
-    seen = (observed - origin) / spacing
-    if config.one_piece:
-        kept = one_piece(volume, level, seen, spacing, config)
-    else:
-        kept = near_observed(volume >= level, seen, config.keep_distance / spacing)
+    kept = own_part(volume, axes, observed, level, config)
     if not kept.any():
         return None
     # What was dropped must not leave a surface; a border of zeros closes what touches the bounds.
@@ -126,6 +122,23 @@ def level_set(
     vertices, faces, _, _ = marching_cubes(volume, level, gradient_direction="ascent")
     vertices = (vertices.astype(np.float64) - 1) * spacing + origin
     return LevelSet(vertices, faces.astype(np.int64))
+
+
+def own_part(
+    volume: NDArray[np.floating],
+    axes: Axes,
+    observed: NDArray[np.floating],
+    level: float,
+    config: SurfaceConfig,
+) -> NDArray[np.bool_]:
+    """Nodes (nx, ny, nz) at `level` or above that `level_set` keeps; none is True where nothing is
+    left."""
+    origin = np.array([axis[0] for axis in axes])
+    spacing = float(axes[0][1] - axes[0][0])
+    seen = (observed - origin) / spacing
+    if config.one_piece:
+        return one_piece(volume, level, seen, spacing, config)
+    return near_observed(volume >= level, seen, config.keep_distance / spacing)
 
 
 def _check_size(size: NDArray[np.float64], spacing: float) -> None:

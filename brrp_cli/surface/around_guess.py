@@ -1,0 +1,96 @@
+"""The region around a shape that no stored object explains.
+
+The hypotheses about such an object agree on what all of them have wrong, so the region that their
+posterior asks for is too small, the more so the further from what was seen. What was observed
+itself is the object's, whatever the posterior makes of it.
+"""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brrp_cli.config import SurfaceConfig
+from brrp_cli.dependencies import import_library
+from brrp_cli.reconstruction import Axes
+from brrp_cli.surface.extract import own_part
+
+Array = NDArray[np.float64]
+
+
+class Free(Protocol):
+    """Where a ball was seen to be empty."""
+
+    def __call__(self, points: Array, radius: float) -> NDArray[np.bool_]:
+        """For each of points (n, 3), metres, camera frame, whether nothing can be within `radius`
+        metres of it."""
+
+
+def grown_by_guess(
+    volume: NDArray[np.floating],
+    axes: Axes,
+    observed: NDArray[np.floating],
+    free: Free,
+    config: SurfaceConfig,
+) -> tuple[Array, Axes]:
+    """A volume (nx, ny, nz) on a wider grid, at least 1 in all that may be the object's, and the
+    grid's axes.
+
+    volume : 1 or more in the region that the posterior asks for; observed : (m, 3) points of the
+    object. Lengths are metres, camera frame. Where the nearest place of that region lies a from the
+    nearest observed point, the object may go beyond it by
+
+        r(a) = min(around_seen + around_guessed a, around_most),
+
+    and by `around_seen` beyond what was observed, but not where a ball of that radius is free:
+    depth errs at outlines, and by as much a free pixel says nothing of its neighbourhood.
+    """
+    ndimage, spatial = import_library("scipy.ndimage"), import_library("scipy.spatial")
+    own = own_part(volume, axes, observed, 1.0, config)
+    volume = np.where((volume >= 1) & ~own, 0.0, volume)
+    volume, axes = widened(volume, axes, config.around_most, observed)
+    spacing = float(axes[0][1] - axes[0][0])
+    nodes = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
+    seen = spatial.cKDTree(observed)
+    beyond, nearest = ndimage.distance_transform_edt(volume < 1, return_indices=True)
+    beyond *= spacing
+    short = (
+        config.around_seen - seen.query(nodes, distance_upper_bound=config.around_seen + spacing)[0]
+    )
+    near = (beyond > 0) & (beyond < config.around_most + spacing)
+    away, _ = seen.query(nodes[tuple(nearest[:, near])])
+    reach = np.minimum(config.around_seen + config.around_guessed * away, config.around_most)
+    short[near] = np.maximum(short[near], reach - beyond[near])
+    may_grow = (beyond > 0) & (short > -spacing)
+    may_grow[may_grow] = ~free(nodes[may_grow], config.around_seen)
+    return np.where(may_grow, np.maximum(volume, 1 + short / spacing), volume), axes
+
+
+def widened(
+    volume: NDArray[np.floating],
+    axes: Axes,
+    margin: float,
+    holds: NDArray[np.floating] | None = None,
+) -> tuple[Array, Axes]:
+    """A volume (nx, ny, nz) with nodes of 0 for at least `margin` metres more on each side, and
+    around points (m, 3) that the grid is to hold; and the axes of that."""
+    spacing = float(axes[0][1] - axes[0][0])
+    low, high = np.array([(axis[0], axis[-1]) for axis in axes]).T
+    before, after = np.zeros(3), np.zeros(3)
+    if holds is not None:
+        before = np.maximum(low - holds.min(axis=0), 0)
+        after = np.maximum(holds.max(axis=0) - high, 0)
+    pads = np.ceil((np.stack([before, after], axis=1) + margin) / spacing).astype(int) + 1
+    x, y, z = (
+        np.concatenate(
+            [
+                axis[0] - spacing * np.arange(first, 0, -1),
+                axis,
+                axis[-1] + spacing * np.arange(1, last + 1),
+            ]
+        )
+        for axis, (first, last) in zip(axes, pads, strict=True)
+    )
+    return np.pad(volume.astype(np.float64), pads), (x, y, z)
