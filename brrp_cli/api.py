@@ -47,6 +47,7 @@ def reconstruct(
     workers: int | None = None,
     helpers: Helpers | None = None,
     only: Collection[int] | None = None,
+    given: Collection[int] | None = None,
     image: Any = None,
     stream: Stream | None = None,
 ) -> Reconstruction:
@@ -61,6 +62,8 @@ def reconstruct(
     helpers : processes that do some of the objects, once they are ready (sessions start them)
     only : ids of the objects that are asked for, by default all; the others are still seen as
         objects
+    given : ids of the masks that somebody gave, by default all; brrp made the others, and what is
+        recognised in a small one of these may be a piece of something else
     image : `Reconstruction.image` of the same frame with other masks
     stream : what earlier frames of the same stream showed (sessions pass it)
 
@@ -87,7 +90,8 @@ def reconstruct(
         helpers=helpers,
     )
     asked = None if only is None else frozenset(only)
-    setup = replace(setup, only=asked, image=image, stream=stream)
+    by_others = None if given is None else frozenset(given)
+    setup = replace(setup, only=asked, given=by_others, image=image, stream=stream)
     seconds = {"retriever": time.perf_counter() - start} if chosen.uses_retriever else {}
     result = chosen.run(frame, setup)
     objects = [each for each in result.objects if only is None or each.object_id in only]
@@ -129,7 +133,9 @@ def try_masks(
         workers=workers,
         helpers=helpers,
     )
-    return chosen.try_masks(frame, replace(setup, image=image), Trial(masks, trial))
+    return chosen.try_masks(
+        frame, replace(setup, given=frozenset(), image=image), Trial(masks, trial)
+    )
 
 
 def _setup(

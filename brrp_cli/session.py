@@ -11,6 +11,7 @@ from __future__ import annotations
 import time
 from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import asdict, replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
@@ -145,9 +146,10 @@ class Reconstructor:
             result = self._tracker(masked, theirs, self._all, self._mended)
             result.seconds["tracking"] += found
         else:
-            result = self._all(masked)
+            infer = partial(self._all, given=frame.corrected if made else None)
+            result = infer(masked)
             if made:
-                result = self._mended(result, self._all, aside, corrected=frame.corrected)
+                result = self._mended(result, infer, aside, corrected=frame.corrected)
         result.seconds["masks"] = seconds
         return replace(result, segmentation=asdict(self._segmentation)) if made else result
 
@@ -168,10 +170,11 @@ class Reconstructor:
         frame: Frame,
         only: Collection[int] | None = None,
         *,
+        given: Collection[int] | None = None,
         image: Any = None,
         stream: Stream | None = None,
     ) -> Reconstruction:
-        return reconstruct(frame, only=only, image=image, stream=stream, **self._given)
+        return reconstruct(frame, only=only, given=given, image=image, stream=stream, **self._setup)
 
     def _tried(
         self,
@@ -181,10 +184,10 @@ class Reconstructor:
         *,
         image: Any = None,
     ) -> list[ObjectReconstruction]:
-        return try_masks(frame, masks, trial, image=image, **self._given)
+        return try_masks(frame, masks, trial, image=image, **self._setup)
 
     @property
-    def _given(self) -> dict[str, Any]:
+    def _setup(self) -> dict[str, Any]:
         return {
             "prior": self._prior,
             "method": self._method,

@@ -316,8 +316,12 @@ class WeighConfig:
     The hypothesis that the object is none of the stored ones has a ratio of 1 and a probability
     within [least_unknown, most_unknown]; no hypothesis counts as less probable than `least_share`,
     since a retriever may be wrong.
+    small : pixels of a mask that brrp made, below which it may be a piece of something: the ratio
+    of "none" grows by `doubt` nats for each factor of e that it has less
     """
 
     least_unknown: float = share(0.1)
     most_unknown: float = share(0.97)
     least_share: float = share(1e-3)
+    small: int = between(600, 1, 1_000_000)
+    doubt: float = between(2.0, 0.0, 100.0)

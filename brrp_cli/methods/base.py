@@ -77,6 +77,7 @@ class Setup:
     workers : objects at a time; None = as many as there are cores. Results do not depend on it
     helpers : processes that do some of the objects, for a method that `takes_helpers`
     only : the ids that are asked for, for a method that works `object_by_object`; None = all
+    given : ids of the masks that somebody gave, None = all; brrp made the others
     image : `Reconstruction.image` of the same frame with other masks
     stream : of which the frame is one, for a method that remembers; None = the frame stands alone
     """
@@ -90,6 +91,7 @@ class Setup:
     workers: int | None = None
     helpers: Helpers | None = None
     only: frozenset[int] | None = None
+    given: frozenset[int] | None = None
     image: Any = None
     stream: Stream | None = None
 

@@ -27,6 +27,7 @@ from brrp_cli.registration.weigh import (
     best_ratios,
     joint_log_likelihood,
     judged,
+    piece_doubt,
     weigh,
 )
 from brrp_cli.retrieval.base import unknown
@@ -206,8 +207,15 @@ class Placer:
             placed, joint = self._in_all_views(placed, alone)
         # Stored objects that are not tried are as good as not in the prior.
         none_tried = unknown(np.array([probability for _, probability in chosen]))
-        weights = weigh(shares, joint, none_tried, self._config.weigh)
+        weights = weigh(shares, joint, none_tried, self._config.weigh, self._doubt())
         return Placements(chosen, [len(group) for group in found], placed, alone, weights)
+
+    def _doubt(self) -> float:
+        """That a mask is one object's, where nobody gave it."""
+        scene, object_id = self._scene, self._observation.object_id
+        if scene.given is None or object_id in scene.given:
+            return 0.0
+        return piece_doubt(int((scene.frame.segmap == object_id).sum()), self._config.weigh)
 
     def _in_all_views(
         self, placed: list[Hypothesis], alone: list[float]

@@ -51,7 +51,7 @@ class Scene:
     """measured : the frame without strays; frame : the same with low things as high as they are;
     clear : the same without what is mixed at outlines, of which completion makes shapes (stored
     ones are held against the outline, too); image : its own, or that of the same frame with other
-    masks; aligns : whether P(c|R) follows from depth, too"""
+    masks; aligns : whether P(c|R) follows from depth, too; given : as in `Setup`"""
 
     measured: Frame
     frame: Frame
@@ -62,6 +62,7 @@ class Scene:
     aligns: bool
     seed: int
     device: str
+    given: frozenset[int] | None
 
 
 def look_at(frame: Frame, setup: Setup, retriever: Retriever, shapes: bool = True) -> Scene:
@@ -83,6 +84,7 @@ def look_at(frame: Frame, setup: Setup, retriever: Retriever, shapes: bool = Tru
         knows_depth(retriever),
         setup.seed,
         pick_device(setup.device),
+        setup.given,
     )
 
 

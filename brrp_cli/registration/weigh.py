@@ -101,13 +101,24 @@ def best_ratios(placed: Sequence[Hypothesis], ratios: Sequence[float]) -> dict[s
     return best
 
 
+def piece_doubt(pixels: int, config: WeighConfig) -> float:
+    """Nats for "none of them", in a mask of so many pixels that brrp made: a small one may be a
+    piece of an object, and pieces look like many objects."""
+    return config.doubt * max(0.0, float(np.log(config.small / max(pixels, 1))))
+
+
 def weigh(
-    shares: Sequence[float], log_ratios: Sequence[float], missing: float, config: WeighConfig
+    shares: Sequence[float],
+    log_ratios: Sequence[float],
+    missing: float,
+    config: WeighConfig,
+    doubt: float = 0.0,
 ) -> Array:
     """Weights (C + 1,), sum 1, of C hypotheses and, last, of the one that it is something else.
 
     shares : P(c|R) of each hypothesis's object; log_ratios : how much more probable each makes the
-    frame than the last one does, nats; missing : P(none of these objects | R).
+    frame than the last one does, nats; missing : P(none of these objects | R); doubt : nats by
+    which the last one is more probable than that.
     """
     none = float(np.clip(missing, config.least_unknown, config.most_unknown))
     known = np.asarray(shares, dtype=np.float64)
@@ -116,7 +127,7 @@ def weigh(
     if not known.any():
         known = np.ones_like(known)
     probability = np.append(known / (known.sum() or 1.0) * (1 - none), none)
-    ratios = np.append(np.asarray(log_ratios, dtype=np.float64), 0.0)
+    ratios = np.append(np.asarray(log_ratios, dtype=np.float64), doubt)
     log = np.log(np.maximum(probability, config.least_share)) + ratios
     weights = np.exp(log - log.max())
     return np.asarray(weights / weights.sum())

@@ -42,10 +42,16 @@ class Made:
 
 
 class Infer(Protocol):
-    """Reconstructs objects of a frame; only : their ids."""
+    """Reconstructs objects of a frame; only : their ids; given : of masks that somebody gave, None
+    = all."""
 
     def __call__(
-        self, frame: Frame, only: Collection[int] | None = None, *, stream: Stream | None = None
+        self,
+        frame: Frame,
+        only: Collection[int] | None = None,
+        *,
+        given: Collection[int] | None = None,
+        stream: Stream | None = None,
     ) -> Reconstruction:
         """See above."""
 
@@ -97,11 +103,12 @@ class Tracker:
         seconds = time.perf_counter() - start
         todo = set(seen.object_ids) - {item.object_id for item in kept}
         stream = self._stream(seen, todo)
-        infer = partial(everything, stream=stream)
-        result = self._inferred(seen, kept, todo, infer)
+        corrected: list[int] | None = None
         if made is not None:
-            theirs = np.isin(frame.segmap, [*made.corrected])
-            corrected = np.unique(seen.segmap[theirs]).tolist()
+            corrected = np.unique(seen.segmap[np.isin(frame.segmap, [*made.corrected])]).tolist()
+        infer = partial(everything, stream=stream, given=corrected)
+        result = self._inferred(seen, kept, todo, infer)
+        if corrected is not None:
             asked = todo - tried_before(self._tried, seen, self._config)
             result = mend(result, infer, fresh, asked, followed.next_id, corrected)
             result = self._renamed(result, followed, corrected)
@@ -134,7 +141,8 @@ class Tracker:
         seconds = time.perf_counter() - start
         todo = set(seen.object_ids) - {item.object_id for item in kept}
         stream = self._stream(seen, todo)
-        result = self._inferred(seen, kept, todo, partial(everything, stream=stream))
+        infer = partial(everything, stream=stream, given=())
+        result = self._inferred(seen, kept, todo, infer)
         result.seconds["tracking"] = seconds
         self._keep(result, kept, stream)
         lost = lost_tracks(last.frame, last.lost, seen, self._config)

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from brrp_cli.config import WeighConfig
-from brrp_cli.registration.weigh import weigh
+from brrp_cli.registration.weigh import piece_doubt, weigh
 
 CONFIG = WeighConfig()
 
@@ -79,3 +81,18 @@ def test_what_is_impossible_weighs_nothing():
 
 def test_without_hypotheses_all_is_unknown():
     np.testing.assert_array_equal(weigh([], [], 0.3, CONFIG), [1.0])
+
+
+def test_doubt_is_added_to_the_odds_of_none():
+    plain = weigh([0.6, 0.2], [2.0, 1.0], 0.2, CONFIG)
+    doubted = weigh([0.6, 0.2], [2.0, 1.0], 0.2, CONFIG, doubt=1.5)
+    odds = [np.log(w[-1] / w[:-1].sum()) for w in (plain, doubted)]
+    assert odds[1] - odds[0] == pytest.approx(1.5)
+    np.testing.assert_allclose(doubted[0] / doubted[1], plain[0] / plain[1])
+
+
+@pytest.mark.parametrize("pixels, nats", [(600, 0.0), (5000, 0.0), (300, 2 * np.log(2))])
+def test_only_in_small_masks_a_piece_is_likely(pixels, nats):
+    config = replace(CONFIG, small=600, doubt=2.0)
+    assert piece_doubt(pixels, config) == pytest.approx(nats)
+    assert np.isfinite(piece_doubt(0, config))
