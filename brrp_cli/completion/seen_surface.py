@@ -1,6 +1,7 @@
 """What the depth of an object says of its surface: bounds of the completion's logit.
 
-What was seen is a surface, to within the noise: the logit is 0 there, and a ramp about it. Behind
+What was seen is a surface, to within the noise: the logit is 0 there, and a ramp about it, by the
+distance across the surface: where that slants, a way along the camera's sight is longer. Behind
 it the ramp is the least that the logit may be, for as thick as the thinnest wall; so a wall is
 there however thin the network makes it. In front of it the ramp is what the logit is, where the
 depth is the object's own beyond doubt. Elsewhere it says nothing: sensors mix both sides of a jump
@@ -23,6 +24,7 @@ from brrp_cli.frames.frame import Frame
 from brrp_cli.frames.projection import at_pixels, between_pixels, depth_behind
 from brrp_cli.observation.fitted_depth import smoothed
 from brrp_cli.observation.pixel_noise import PixelNoise
+from brrp_cli.observation.slant import across_surface
 from brrp_cli.observation.support_plane import Plane
 
 Array = NDArray[np.float64]
@@ -47,12 +49,14 @@ class Bounds:
 class SeenSurface:
     """frame : with the object's depth smoothed; sure : (H, W) bool, the object's pixels whose
     depth is its own surface beyond doubt; nearer : metres, by which the surface lies in front of
-    the other pixels' depth"""
+    the other pixels' depth; across : (H, W), metres across the surface for a metre along the
+    camera's axis"""
 
     frame: Frame
     object_id: int
     sure: NDArray[np.bool_]
     nearer: float
+    across: NDArray[np.float32]
 
     def bounds(self, points: Array, shell: float, config: MeanConfig) -> Bounds:
         """At points (n, 3), metres, camera frame; shell : metres, how thick what was seen is."""
@@ -61,6 +65,7 @@ class SeenSurface:
         own &= np.isfinite(behind)
         sure = at_pixels(points, self.sure, self.frame) == 1
         behind += np.where(sure, 0.0, self.nearer)
+        behind *= np.where(own, at_pixels(points, self.across, self.frame), 1.0)
         return ramp_bounds(behind, own, own & sure, shell, config)
 
     def behind(self, points: Array) -> Array:
@@ -88,7 +93,8 @@ def seen_surface(
     if plane is not None:
         with np.errstate(invalid="ignore"):
             sure &= plane.signed_distance(smooth.points) > config.rise * wave
-    return SeenSurface(smooth, object_id, sure, config.nearer * wave)
+    across = across_surface(smooth, object_id, config.slant)
+    return SeenSurface(smooth, object_id, sure, config.nearer * wave, across)
 
 
 def ramp_bounds(
@@ -98,8 +104,9 @@ def ramp_bounds(
     shell: float,
     config: MeanConfig,
 ) -> Bounds:
-    """Of points that lie `behind` (n,) metres behind what was seen, where it is the object's `own`
-    (n,); in front of it only where that is `sure` (n,). shell : as in `SeenSurface.bounds`."""
+    """Of points that lie `behind` (n,) metres behind what was seen, across it, where it is the
+    object's `own` (n,); in front of it only where that is `sure` (n,). shell : as in
+    `SeenSurface.bounds`."""
     ramp = config.shell_logit / config.ramp.width * np.clip(behind, -shell, shell)
     front = sure & (behind < 0)
     told = own & (behind < shell) & np.where(front, behind > -shell, behind >= 0)

@@ -45,6 +45,18 @@ class FittedDepthConfig:
 
 
 @dataclass(frozen=True)
+class SlantConfig:
+    """How a surface slants to the camera's sight (brrp_cli/observation/slant.py).
+
+    blur : pixels, deviation, over which its slope is averaged
+    least : metres across it for a metre along the sight, at least: steeper slopes are noise
+    """
+
+    blur: float = 2.0
+    least: float = share(0.33)
+
+
+@dataclass(frozen=True)
 class RampConfig:
     """The logit about what was seen (brrp_cli/completion/seen_surface.py).
 
@@ -58,6 +70,7 @@ class RampConfig:
     margin: float = 0.0042
     rise: float = 4.0
     nearer: float = between(1.0, 0.0, 10.0)
+    slant: SlantConfig = field(default_factory=SlantConfig)
     depth: FittedDepthConfig = field(default_factory=FittedDepthConfig)
 
 

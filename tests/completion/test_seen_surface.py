@@ -35,6 +35,19 @@ def noise(frame, wave=0.001, at_jump=None):
     return PixelNoise(fine, nowhere if at_jump is None else at_jump, wave, 1.0, 1.0)
 
 
+def leaning(degrees, depth=1.0):
+    """The same object, but its plane leans away at the top, about the row of the camera's axis."""
+    frame = wall()
+    slope = np.tan(np.radians(degrees))
+    rows = (np.arange(80)[:, None] - 40) / 100
+    image = np.where(frame.segmap == OWN, depth / (1 + slope * rows), 2.0)
+    return Frame(frame.rgb, backproject(image, K), frame.segmap, K)
+
+
+def straight_on(frame):
+    return np.ones(frame.shape, np.float32)
+
+
 def at(column, z, row=40):
     return [(column - 50) / 100 * z, (row - 40) / 100 * z, z]
 
@@ -67,7 +80,7 @@ def test_a_leaning_surface_has_no_stairs():
     """A plane, of which 1 / z is a linear function of the pixel; a pixel's own depth is none."""
     columns = np.arange(100.0)
     frame = wall(1 / (1.0 + 0.02 * (columns[40:80] - 60)))
-    surface = SeenSurface(frame, OWN, frame.segmap == OWN, 0.001)
+    surface = SeenSurface(frame, OWN, frame.segmap == OWN, 0.001, straight_on(frame))
     between = np.linspace(55, 65, 41)
     on_it = np.array([at(column, 1 / (1.0 + 0.02 * (column - 60))) for column in between])
     np.testing.assert_allclose(surface.behind(on_it), 0, atol=1e-6)
@@ -77,14 +90,14 @@ def test_between_sure_pixels_and_others_the_nearest_one_counts():
     frame = wall()
     sure = np.zeros(frame.shape, bool)
     sure[:, :60] = True
-    surface = SeenSurface(frame, OWN, sure, 0.001)
+    surface = SeenSurface(frame, OWN, sure, 0.001, straight_on(frame))
     found = surface.behind(np.array([at(59.7, 1.002), at(79.4, 1.002), at(79.6, 1.002)]))
     np.testing.assert_allclose(found, [0.002, 0.002, -0.998], atol=1e-6)
 
 
 def test_behind_the_camera_and_beside_the_image_nothing_was_seen():
     frame = wall()
-    surface = SeenSurface(frame, OWN, np.ones(frame.shape, bool), 0.001)
+    surface = SeenSurface(frame, OWN, np.ones(frame.shape, bool), 0.001, straight_on(frame))
     points = np.array([[0.0, 0, -1], [0, 0, 0], at(-5, 1.0), at(150, 1.0), at(60, 1.0, row=-9)])
     assert np.isnan(surface.behind(points)).all()
 
@@ -121,6 +134,20 @@ def test_pixels_without_depth_bound_nothing():
     frame = wall()
     points = frame.points.copy()
     points[frame.segmap == OWN] = np.nan
-    blind = SeenSurface(frame.with_points(points), OWN, frame.segmap == OWN, 0.001)
+    blind = SeenSurface(
+        frame.with_points(points), OWN, frame.segmap == OWN, 0.001, straight_on(frame)
+    )
     found = blind.bounds(np.array([at(60, 0.99), at(60, 1.001)]), SHELL, MEAN)
     assert (found.least == -MEAN.limit).all() and (found.most == MEAN.limit).all()
+
+
+@pytest.mark.parametrize("degrees", [30, 60])
+def test_a_wall_that_leans_is_as_thick_across_as_one_that_does_not(degrees):
+    """On the camera's axis a way along it is 1 / cos times as long."""
+    frame = leaning(degrees)
+    surface = seen_surface(frame, OWN, None, noise(frame), MEAN.ramp)
+    along = np.array([0.0, 0.0005, 0.0015, 0.0035, 0.0045]) / np.cos(np.radians(degrees))
+    points = np.array([at(60, 1.0 + each) for each in along])
+    bounds = surface.bounds(points, SHELL, MEAN)
+    expected = [0.0, 1 / 3, 1.0, 7 / 3, -MEAN.limit]
+    np.testing.assert_allclose(bounds.least, expected, atol=0.03)
