@@ -51,7 +51,7 @@ class SurfaceConfig:
     nodes: int = 300_000
     keep_distance: float = 0.01
     one_piece: bool = True
-    seen_share: float = share(0.03)
+    seen_share: float = share(0.012)
     volume_share: float = share(0.1)
     route_radius: float = 0.003
     route_step: float = 0.1
