@@ -75,13 +75,13 @@ def test_the_mesh_of_two_parts_is_closed_and_in_one_piece():
 
 @pytest.mark.parametrize("dropped", [0, 3])
 def test_a_part_that_few_points_are_near_is_dropped(dropped):
-    """A phantom as large as the object, with 3 of 83 points or none on it, is a phantom all the
-    same where they are fewer than the share that counts."""
+    """With 3 of 323 points or none on it, it is a phantom: they are fewer than the share that
+    counts."""
     volume = two_boxes()
     volume[RIGHT] = 0.01
     phantom = np.s_[25:28, 10:13, 10:13]
     volume[phantom] = 0.9
-    observed = np.concatenate([faces(LEFT)] * 2 + [faces(phantom)[:dropped]])
+    observed = np.concatenate([faces(LEFT)] * 4 + [faces(phantom)[:dropped]])
     kept = one_piece(volume, 0.5, observed, SPACING, CONFIG)
     assert kept[LEFT].all() and not kept[phantom].any()
     assert pieces(kept) == 1
@@ -89,7 +89,8 @@ def test_a_part_that_few_points_are_near_is_dropped(dropped):
 
 def test_a_bulky_part_needs_fewer_points():
     volume = two_boxes()
-    observed = np.concatenate([faces(LEFT)] * 4 + [faces(RIGHT)[:4]])
+    observed = np.concatenate([faces(LEFT)] * 6 + [faces(RIGHT)[:4]])
+    assert 4 / len(observed) < CONFIG.seen_share
     kept = one_piece(volume, 0.5, observed, SPACING, CONFIG)
     assert kept[LEFT].all() and kept[RIGHT].all()
 
