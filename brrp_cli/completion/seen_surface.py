@@ -50,13 +50,14 @@ class SeenSurface:
     """frame : with the object's depth smoothed; sure : (H, W) bool, the object's pixels whose
     depth is its own surface beyond doubt; nearer : metres, by which the surface lies in front of
     the other pixels' depth; across : (H, W), metres across the surface for a metre along the
-    camera's axis"""
+    camera's axis; plane : on which the object stands"""
 
     frame: Frame
     object_id: int
     sure: NDArray[np.bool_]
     nearer: float
     across: NDArray[np.float32]
+    plane: Plane | None = None
 
     def bounds(self, points: Array, shell: float, config: MeanConfig) -> Bounds:
         """At points (n, 3), metres, camera frame; shell : metres, how thick what was seen is."""
@@ -66,7 +67,12 @@ class SeenSurface:
         sure = at_pixels(points, self.sure, self.frame) == 1
         behind += np.where(sure, 0.0, self.nearer)
         behind *= np.where(own, at_pixels(points, self.across, self.frame), 1.0)
-        return ramp_bounds(behind, own, own & sure, shell, config)
+        found = ramp_bounds(behind, own, own & sure, shell, config)
+        if self.plane is None:
+            return found
+        # What stands on the plane ends there, however thick what was seen may be.
+        sunk = self.plane.signed_distance(points) < -config.sunk
+        return Bounds(np.where(sunk, -config.limit, found.least), found.most)
 
     def behind(self, points: Array) -> Array:
         """Metres (n,) from what was seen to points (n, 3), along the camera's axis; NaN where there
@@ -94,7 +100,7 @@ def seen_surface(
         with np.errstate(invalid="ignore"):
             sure &= plane.signed_distance(smooth.points) > config.rise * wave
     across = across_surface(smooth, object_id, config.slant)
-    return SeenSurface(smooth, object_id, sure, config.nearer * wave, across)
+    return SeenSurface(smooth, object_id, sure, config.nearer * wave, across, plane)
 
 
 def ramp_bounds(

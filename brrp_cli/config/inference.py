@@ -155,8 +155,9 @@ class MeanConfig:
     `nodes` nodes, or `minor_nodes` where that weighs less than `minor`. The network is evaluated at
     every node where the coarse ones around are not all `beyond_doubt`; about what is seen of it its
     logit is a `ramp` as steep as `shell_logit` says, for `shell` metres, or `shell_nodes` of the
-    grid's spacings where these are longer. Space is empty that lies more than `carve_depth` in
-    front of the measured depth, or `carve_plane` below the plane, or less than `carve_behind`
+    grid's spacings where these are longer, and `sunk` metres below the plane at most. Space is
+    empty that lies more than `carve_depth` in front of the measured depth, or `carve_plane` below
+    the plane, or less than `carve_behind`
     behind what is no object's and more than `carve_pixels` from the mask.
     """
 
@@ -172,6 +173,7 @@ class MeanConfig:
     shell: float = 0.004
     shell_nodes: float = 1.3
     shell_logit: float = 2.0
+    sunk: float = 0.002
     ramp: RampConfig = field(default_factory=RampConfig)
     revolution: RevolutionConfig = field(default_factory=RevolutionConfig)
     standing: StandingConfig = field(default_factory=StandingConfig)
