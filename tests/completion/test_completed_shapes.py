@@ -73,12 +73,7 @@ def test_solids_have_about_their_volume(name, yaw):
     assert 0.75 < mesh.volume / SOLIDS[name].volume < 1.3
 
 
-# Without kin, the far wall and the handle of a mug come out too thin.
-THIN = pytest.mark.xfail(strict=True, reason="a mug has about half of its volume")
-WALLS = [pytest.param(name, marks=THIN if name == "mug" else ()) for name in HOLLOW]
-
-
-@pytest.mark.parametrize("name", WALLS)
+@pytest.mark.parametrize("name", list(HOLLOW))
 def test_what_is_looked_into_is_hollow_with_walls(name):
     """Less than half of what it would be if it were full, and not much less than it is."""
     true = HOLLOW[name]

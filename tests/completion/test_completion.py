@@ -98,10 +98,11 @@ def test_what_is_seen_has_some_thickness_whatever_the_network_says():
     thinks = network_grid(nodes, empty, part_of(frame), MEAN)[~empty]
     points, found = nodes[~empty], mean.values.astype(float)[~empty]
     surface = surface_seen(frame, 5)
-    behind = surface.behind(points)
+    behind = surface.behind(points) * at_pixels(points, surface.across, frame)
     thickness = max(MEAN.shell, MEAN.shell_nodes * mean.spacing)
     own = at_pixels(points, frame.segmap, frame) == 5
     wall = own & (behind > MEAN.ramp.width) & (behind < thickness - surface.nearer)
+    wall &= TABLE.signed_distance(points) > 0
     assert (thinks[wall] < 0).any()
     assert (found[wall] >= MEAN.shell_logit).all()
     front = own & (at_pixels(points, surface.sure, frame) == 1) & (behind < -0.0001)

@@ -151,3 +151,16 @@ def test_a_wall_that_leans_is_as_thick_across_as_one_that_does_not(degrees):
     bounds = surface.bounds(points, SHELL, MEAN)
     expected = [0.0, 1 / 3, 1.0, 7 / 3, -MEAN.limit]
     np.testing.assert_allclose(bounds.least, expected, atol=0.03)
+
+
+def test_a_shell_ends_at_the_plane_on_which_the_object_stands():
+    """The plane meets the wall between rows 49 and 50, or 0.2 mm above row 50."""
+    frame, config = wall(), replace(MEAN, sunk=0.001)
+    table = Plane(np.array([0.0, -1.0, 0.0]), 0.1)
+    surface = SeenSurface(frame, OWN, frame.segmap == OWN, 0.001, straight_on(frame), table)
+    points = np.array([at(60, 1.002, row) for row in (49, 50, 51)])
+    np.testing.assert_allclose(table.signed_distance(points), [0.00982, -0.0002, -0.01022])
+    least = surface.bounds(points, SHELL, config).least
+    np.testing.assert_allclose(least, [4 / 3, 4 / 3, -config.limit])
+    whole = replace(surface, plane=None).bounds(points, SHELL, config)
+    np.testing.assert_allclose(whole.least, 4 / 3)
