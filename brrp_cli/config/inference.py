@@ -157,8 +157,8 @@ class MeanConfig:
     logit is a `ramp` as steep as `shell_logit` says, for `shell` metres, or `shell_nodes` of the
     grid's spacings where these are longer, and `sunk` metres below the plane at most. Space is
     empty that lies more than `carve_depth` in front of the measured depth, or `carve_plane` below
-    the plane, or less than `carve_behind`
-    behind what is no object's and more than `carve_pixels` from the mask.
+    the plane, or less than `carve_behind` behind what is no object's and more than `carve_pixels`
+    from the mask.
     """
 
     nodes: int = 200_000

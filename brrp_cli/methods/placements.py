@@ -211,7 +211,7 @@ class Placer:
         return Placements(chosen, [len(group) for group in found], placed, alone, weights)
 
     def _doubt(self) -> float:
-        """That a mask is one object's, where nobody gave it."""
+        """Nats for "none of them", in a mask that nobody gave."""
         scene, object_id = self._scene, self._observation.object_id
         if scene.given is None or object_id in scene.given:
             return 0.0

@@ -50,7 +50,11 @@ def grown_by_guess(
     ndimage, spatial = import_library("scipy.ndimage"), import_library("scipy.spatial")
     own = own_part(volume, axes, observed, 1.0, config)
     volume = np.where((volume >= 1) & ~own, 0.0, volume)
-    volume, axes = widened(volume, axes, config.around_most, observed)
+    volume, axes = widened(volume, axes, config.around_most + config.around_seen)
+    # A stray point far away is no reason for a grid that reaches there.
+    low, high = np.array([(axis[0], axis[-1]) for axis in axes]).T
+    inner = np.abs(observed - (low + high) / 2) < (high - low) / 2 - config.around_seen
+    observed = observed[inner.all(axis=1)]
     spacing = float(axes[0][1] - axes[0][0])
     nodes = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
     seen = spatial.cKDTree(observed)
@@ -68,29 +72,11 @@ def grown_by_guess(
     return np.where(may_grow, np.maximum(volume, 1 + short / spacing), volume), axes
 
 
-def widened(
-    volume: NDArray[np.floating],
-    axes: Axes,
-    margin: float,
-    holds: NDArray[np.floating] | None = None,
-) -> tuple[Array, Axes]:
-    """A volume (nx, ny, nz) with nodes of 0 for at least `margin` metres more on each side, and
-    around points (m, 3) that the grid is to hold; and the axes of that."""
+def widened(volume: NDArray[np.floating], axes: Axes, margin: float) -> tuple[Array, Axes]:
+    """A volume (nx, ny, nz) with nodes of 0 for at least `margin` metres more on each side, and the
+    axes of that."""
     spacing = float(axes[0][1] - axes[0][0])
-    low, high = np.array([(axis[0], axis[-1]) for axis in axes]).T
-    before, after = np.zeros(3), np.zeros(3)
-    if holds is not None:
-        before = np.maximum(low - holds.min(axis=0), 0)
-        after = np.maximum(holds.max(axis=0) - high, 0)
-    pads = np.ceil((np.stack([before, after], axis=1) + margin) / spacing).astype(int) + 1
-    x, y, z = (
-        np.concatenate(
-            [
-                axis[0] - spacing * np.arange(first, 0, -1),
-                axis,
-                axis[-1] + spacing * np.arange(1, last + 1),
-            ]
-        )
-        for axis, (first, last) in zip(axes, pads, strict=True)
-    )
-    return np.pad(volume.astype(np.float64), pads), (x, y, z)
+    cells = int(np.ceil(margin / spacing)) + 1
+    steps = spacing * np.arange(1, cells + 1)
+    x, y, z = (np.concatenate([a[0] - steps[::-1], a, a[-1] + steps]) for a in axes)
+    return np.pad(volume.astype(np.float64), cells), (x, y, z)

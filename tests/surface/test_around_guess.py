@@ -85,9 +85,9 @@ def test_it_does_not_grow_where_nothing_can_be(posterior):
 
 
 def test_what_was_seen_apart_from_the_rest_lies_inside(posterior):
-    """A propeller that the posterior makes nothing of."""
-    apart = CENTER + [0.12, 0, 0] + np.mgrid[-2:3, -2:3, 0:1].reshape(3, -1).T * 0.002
-    mesh = region(posterior, nothing, observed=np.vstack([SEEN, apart]))
+    """A propeller that the posterior makes nothing of; and a stray point metres away does not."""
+    apart = CENTER + [0.085, 0, 0] + np.mgrid[-2:3, -2:3, 0:1].reshape(3, -1).T * 0.002
+    mesh = region(posterior, nothing, observed=np.vstack([SEEN, apart, CENTER + [0, 0, 5]]))
     assert inside(mesh, apart).all()
     assert mesh.body_count == 2
     wide = trimesh.Trimesh(mesh.vertices, mesh.faces).split()[1].extents
