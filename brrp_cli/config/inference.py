@@ -48,11 +48,13 @@ class FittedDepthConfig:
 class SlantConfig:
     """How a surface slants to the camera's sight (brrp_cli/observation/slant.py).
 
-    blur : pixels, deviation, over which its slope is averaged
+    blur : pixels, deviation, over which its slope is averaged, where a share `known` of the pixels
+    so near has one; elsewhere the nearest such place counts
     least : metres across it for a metre along the sight, at least: steeper slopes are noise
     """
 
     blur: float = 2.0
+    known: float = share(0.05)
     least: float = share(0.33)
 
 

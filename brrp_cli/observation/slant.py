@@ -10,9 +10,6 @@ from brrp_cli.dependencies import import_library
 from brrp_cli.frames.dilate import mask_box
 from brrp_cli.frames.frame import Frame
 
-# Share of the neighbourhood that has to have a slope.
-_LEAST_KNOWN = 0.05
-
 
 def across_surface(frame: Frame, object_id: int, config: SlantConfig) -> NDArray[np.float32]:
     """(H, W) metres across an object's surface for a metre along the camera's axis: 1 where it is
@@ -29,7 +26,7 @@ def across_surface(frame: Frame, object_id: int, config: SlantConfig) -> NDArray
         return found
     own, depth = own[box], frame.depth[box].astype(np.float64)
     inverse = np.where(own, 1 / np.where(own, depth, 1.0), np.nan)
-    slopes = _averaged(list(np.gradient(inverse)), config.blur)
+    slopes = _averaged(list(np.gradient(inverse)), config)
     if slopes is None:
         return found
     down, right = slopes
@@ -42,21 +39,24 @@ def across_surface(frame: Frame, object_id: int, config: SlantConfig) -> NDArray
     return found
 
 
-def _averaged(slopes: list[NDArray[np.float64]], blur: float) -> list[NDArray[np.float64]] | None:
+def _averaged(
+    slopes: list[NDArray[np.float64]], config: SlantConfig
+) -> list[NDArray[np.float64]] | None:
     """Slopes (h, w), averaged over their neighbourhood, and where nothing is known in it, over the
     nearest one; None where none is known."""
     ndimage = import_library("scipy.ndimage")
     known = np.isfinite(slopes).all(axis=0)
-    weight = ndimage.gaussian_filter(known.astype(np.float64), blur)
-    unknown = weight < _LEAST_KNOWN
+    weight = ndimage.gaussian_filter(known.astype(np.float64), config.blur)
+    unknown = weight < config.known
     if unknown.all():
         return None
     nearest = tuple(
         ndimage.distance_transform_edt(unknown, return_distances=False, return_indices=True)
     )
     return [
-        (ndimage.gaussian_filter(np.where(known, each, 0.0), blur) / np.maximum(weight, 1e-9))[
-            nearest
-        ]
+        (
+            ndimage.gaussian_filter(np.where(known, each, 0.0), config.blur)
+            / np.maximum(weight, 1e-9)
+        )[nearest]
         for each in slopes
     ]

@@ -1,6 +1,7 @@
 """Results to collision shapes through the real command, and into the simulators."""
 
 import json
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -44,6 +45,18 @@ def plan(results) -> tuple[Path, str]:
 def grown(results) -> Path:
     folder = results.parent / "grown"
     assert run(results, "--collision", "hull", "--confidence", 0.95, "-o", folder)[0] == 0
+    return folder
+
+
+@pytest.fixture(scope="module")
+def tight(results) -> Path:
+    """Results of a configuration that gives guesses no room."""
+    folder = results.parent / "tight"
+    shutil.copytree(results, folder, ignore=shutil.ignore_patterns("plan"))
+    told = json.loads((folder / "result.json").read_text())
+    told["config"]["surface"] |= {"around_seen": 1e-9, "around_most": 1e-9}
+    (folder / "result.json").write_text(json.dumps(told))
+    assert run(folder, "--collision", "hull", "--confidence", 0.95)[0] == 0
     return folder
 
 
@@ -114,6 +127,17 @@ def test_the_hull_fills_it(grown):
     assert outside_hull(hull, hollow[None, :3])[0] < 0
 
 
+def test_a_margin_holds_the_true_surface_and_follows_the_uncertainty(tight):
+    """The posterior's surface is logistic with scale 2 mm: at 0.95 it is grown by 2 ln 19 mm."""
+    for object_id, true in truth().items():
+        (hull,) = parts(tight / "plan", object_id)
+        assert outside_hull(hull, true.vertices).max() < 0
+        item = of(tight / "plan", object_id)
+        assert item["level"] == pytest.approx(0.05, rel=0.1)
+        assert item["bounded"]
+        assert item["margin_mean"] == pytest.approx(0.0059, abs=0.001)
+
+
 def test_what_is_guessed_is_held_with_room_where_nothing_was_seen(results, grown):
     """The posterior's surface is logistic with scale 2 mm: at 0.95 C_t lies 2 ln 19 mm beyond it,
     and the shape 1 to 5 cm beyond that."""
@@ -137,13 +161,19 @@ def test_what_is_guessed_is_held_with_room_where_nothing_was_seen(results, grown
     assert record(grown)["confidence"] == 0.95
 
 
-def test_more_margin_holds_more_but_nothing_below_the_table(results, grown, tmp_path):
+def test_more_margin_holds_more_but_nothing_below_the_table(results, grown, tight, tmp_path):
     options = ("--collision", "hull", "--confidence", 0.95, "--margin", 20)
     assert run(results, *options, "-o", tmp_path / "plan")[0] == 0
     for object_id in (BOX, ELL):
         wide, narrow = of(tmp_path / "plan", object_id), of(grown, object_id)
         assert wide["collision_volume_litre"] > narrow["collision_volume_litre"]
         (hull,) = parts(tmp_path / "plan", object_id)
+        assert TABLE.signed_distance(hull).min() > -0.012
+    assert run(tight, *options, "-o", tmp_path / "tight")[0] == 0
+    for object_id in (BOX, ELL):
+        wide, narrow = of(tmp_path / "tight", object_id), of(tight / "plan", object_id)
+        assert wide["collision_volume_litre"] > 1.1 * narrow["collision_volume_litre"]
+        (hull,) = parts(tmp_path / "tight", object_id)
         assert TABLE.signed_distance(hull).min() > -0.012
 
 
@@ -168,10 +198,11 @@ def test_dropped_in_mujoco_it_rests(plan, object_id):
     assert found.height == pytest.approx(-low, abs=0.003)
 
 
-def test_the_whole_scene_rests_on_its_table(plan):
+def test_the_whole_scene_rests_on_its_table(plan, tight):
     pytest.importorskip("mujoco")
-    for moved, lately in settle_scene(plan[0] / "scene.xml").values():
-        assert moved < 0.003 and lately < 0.001
+    for folder in (plan[0], tight / "plan"):
+        for moved, lately in settle_scene(folder / "scene.xml").values():
+            assert moved < 0.003 and lately < 0.001
 
 
 def test_curobo_reads_poses_and_closed_meshes(plan):
