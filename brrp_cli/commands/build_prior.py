@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     type=click.Path(path_type=Path),
     help="TOML, JSON or CSV: name -> short phrase, such as 'a red cracker box'.",
 )
-@click.option("--units", type=click.Choice(list(UNITS)), default="m", help="Of the mesh files.")
+@click.option("--units", type=click.Choice(list(UNITS)), default="m", help="Unit of the meshes.")
 @click.option(
     "--samples",
     type=click.IntRange(100, 1_000_000),

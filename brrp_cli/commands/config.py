@@ -24,14 +24,20 @@ def command() -> None:
 
 @command.command("show")
 @click.option(
-    "--method", type=OneOf(lambda: list(METHODS)), default=DEFAULT, show_default=True, help="Whose."
+    "--method",
+    type=OneOf(lambda: list(METHODS)),
+    default=DEFAULT,
+    show_default=True,
+    help="Method to show.",
 )
 @click.option(
     "--preset",
     type=OneOf(preset_names),
     help="A named configuration of the method. [default: its first]",
 )
-@click.option("--config", "file", type=click.Path(path_type=Path), help="With its changes.")
+@click.option(
+    "--config", "file", type=click.Path(path_type=Path), help="TOML whose changes are shown, too."
+)
 def show(method: str, preset: str | None, file: Path | None) -> None:
     """Print a configuration as TOML, which --config of other commands takes, whole or in part.
 

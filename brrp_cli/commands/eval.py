@@ -79,7 +79,7 @@ def _selection(ctx: click.Context, option: click.Parameter, value: str | None) -
     "--weights",
     multiple=True,
     callback=_several(click.Path(path_type=Path)),
-    help=f"{weights_help()} The names of the files stand for them in the tables.",
+    help=f"{weights_help()} Tables show the names of the files.",
 )
 @click.option(
     "--preset",
@@ -100,7 +100,7 @@ def _selection(ctx: click.Context, option: click.Parameter, value: str | None) -
     "ks",
     multiple=True,
     callback=_several(click.IntRange(min=1)),
-    help="Retrieved objects, such as 1,3,5,10. [default: the presets' own]",
+    help="Numbers of retrieved objects, such as 1,3,5,10. [default: the presets' own]",
 )
 @click.option(
     "--retriever",
@@ -122,10 +122,16 @@ def _selection(ctx: click.Context, option: click.Parameter, value: str | None) -
     multiple=True,
     default=["0"],
     callback=_several(click.IntRange(-100, 100)),
-    help="Pixels to the right, such as 0,2. [default: 0]",
+    help="Shift masks to the right by so many pixels, such as 0,2. [default: 0]",
 )
 @click.option("--noise", is_flag=True, help="Add the noise of a structured-light camera.")
-@click.option("--scenes", "selection", metavar="A:B", callback=_selection, help="Only these.")
+@click.option(
+    "--scenes",
+    "selection",
+    metavar="A:B",
+    callback=_selection,
+    help="Only scenes A to B, without B.",
+)
 @click.option("--workers", type=click.IntRange(1), help="Processes of one thread. [default: cores]")
 @scheduler_option
 @click.option("--pictures", is_flag=True, help="Write a picture of each scene and variant.")

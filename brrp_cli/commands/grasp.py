@@ -33,7 +33,7 @@ GRIPPER_HELP = f"{', '.join(gripper_names())}, or a YAML file."
     "-o",
     "--output",
     type=click.Path(path_type=Path),
-    help=f"Where the grasps go. [default: OUT/{RECORD}]",
+    help=f"File to write. [default: OUT/{RECORD}]",
 )
 @click.option(
     "--gripper", metavar="NAME|FILE.yaml", default=DEFAULT, show_default=True, help=GRIPPER_HELP

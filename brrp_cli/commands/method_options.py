@@ -47,7 +47,7 @@ def methods_help(names: Sequence[str]) -> str:
 def weights_help() -> str:
     """Which methods `--weights` is for."""
     trained = [name for name, method in METHODS.items() if method.uses_weights]
-    return f"What {' or '.join(trained)} was trained to. [default: what comes with brrp]"
+    return f"Trained weights of {' or '.join(trained)}. [default: those that come with brrp]"
 
 
 def check_weights(methods: Sequence[str], weights: Sequence[Path]) -> None:

@@ -57,14 +57,14 @@ NO_COLLISION = "none"
     "--frames",
     metavar="A:B",
     callback=frame_slice,
-    help="Many frames of SOURCE: from A until before B, counted from 0; `:` is all. Each goes into"
-    " OUT/FRAME/; those that are there are left.",
+    help="Many frames of SOURCE: from A up to B, without B, counted from 0; `:` is all. Each goes"
+    " into OUT/FRAME/; finished frames stay as they are.",
 )
 @click.option(
     "--track",
     is_flag=True,
-    help="With --frames: they are a stream. Objects keep their ids, and what is at rest is not done"
-    " again.",
+    help="With --frames: they are one stream. Objects keep their ids, and objects at rest are not"
+    " reconstructed again.",
 )
 @click.option("--prior", "prior_path", type=click.Path(path_type=Path), help="The prior to use.")
 @click.option(
@@ -92,7 +92,11 @@ NO_COLLISION = "none"
     help="A named configuration of the method. [default: its first]",
 )
 @click.option("--config", "file", type=click.Path(path_type=Path), help=CONFIG_HELP)
-@click.option("--k", type=click.IntRange(min=1), help="Retrieved objects. [default: the preset's]")
+@click.option(
+    "--k",
+    type=click.IntRange(min=1),
+    help="Number of retrieved objects that are tried. [default: the preset's]",
+)
 @click.option(
     "--retriever",
     type=RetrieverName(RETRIEVERS),
@@ -115,13 +119,13 @@ NO_COLLISION = "none"
 )
 @click.option("--seed", type=SEED, default=0, show_default=True, help=SEED_HELP)
 @device_option
-@click.option("--workers", type=click.IntRange(1), help="Objects at a time. [default: cores]")
+@click.option("--workers", type=click.IntRange(1), help="Objects done at a time. [default: cores]")
 @click.option(
     "--collision",
     type=click.Choice([*HOW, NO_COLLISION]),
     default=NO_COLLISION,
     show_default=True,
-    help="Also what `brrp export` writes, into OUT/plan/.",
+    help="Also write what `brrp export` writes, into OUT/plan/.",
 )
 @click.option(
     "--confidence",
@@ -129,20 +133,22 @@ NO_COLLISION = "none"
     help="With --collision: shapes inside which each object lies with this probability.",
 )
 @click.option(
-    "--grasp", "grasp_it", is_flag=True, help=f"Also what `brrp grasp` writes, OUT/{RECORD}."
+    "--grasp", "grasp_it", is_flag=True, help=f"Also plan grasps (`brrp grasp`): OUT/{RECORD}."
 )
 @click.option(
     "--gripper",
     metavar="NAME|FILE.yaml",
-    help=f"Of --grasp: {GRIPPER_HELP} [default: {DEFAULT_HAND}]",
+    help=f"With --grasp: {GRIPPER_HELP} [default: {DEFAULT_HAND}]",
 )
 @click.option(
     "--poses",
     type=click.Choice(["bop"]),
-    help=f"Also the 6D poses of recognised objects: OUT/{POSES}, a BOP results file.",
+    help=f"Also write the 6D poses of recognised objects: OUT/{POSES}, a BOP results file.",
 )
-@click.option("--html", is_flag=True, help=f"Also what `brrp view` writes, OUT/{PAGE}.")
-@click.option("--view", "open_it", is_flag=True, help="The same, and open it in a browser.")
+@click.option("--html", is_flag=True, help=f"Also write the page of `brrp view`: OUT/{PAGE}.")
+@click.option(
+    "--view", "open_it", is_flag=True, help="Write the page of --html and open it in a browser."
+)
 @json_option
 @click.option("--overwrite", is_flag=True, help="Replace the output folder if it is there.")
 def command(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import click
 
 SEED = click.IntRange(min=0)
-SEED_HELP = "Of all randomness: the same seed gives the same bytes."
+SEED_HELP = "Seed of all randomness: the same seed gives the same bytes."
 
 device_option = click.option(
     "--device",

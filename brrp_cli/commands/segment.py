@@ -43,14 +43,31 @@ def _splits(
 
 @click.command("segment")
 @source_options
-@click.option("--again", is_flag=True, help="Make masks anew where the source has some.")
+@click.option("--again", is_flag=True, help="Make new masks although the source has some.")
 @click.option(
-    "--split", "splits", multiple=True, callback=_splits, metavar="ID[:PIECES]", help="Cut in two."
+    "--split",
+    "splits",
+    multiple=True,
+    callback=_splits,
+    metavar="ID[:PIECES]",
+    help="Cut object ID in two, or in PIECES.",
 )
 @click.option(
-    "--merge", "merges", multiple=True, callback=_ids, metavar="ID,ID", help="Make them one."
+    "--merge",
+    "merges",
+    multiple=True,
+    callback=_ids,
+    metavar="ID,ID",
+    help="Make these objects one, with the first id.",
 )
-@click.option("--drop", "drops", multiple=True, callback=_ids, metavar="ID", help="Forget them.")
+@click.option(
+    "--drop",
+    "drops",
+    multiple=True,
+    callback=_ids,
+    metavar="ID",
+    help="Make this object background.",
+)
 @click.option("--config", "file", type=click.Path(path_type=Path), help=CONFIG_HELP)
 @click.option("--seed", type=SEED, default=0, show_default=True, help=SEED_HELP)
 @click.option("-o", "--output", type=click.Path(path_type=Path), help="FRAME.npz")
