@@ -25,6 +25,13 @@ prior_option = click.option(
     type=click.Path(path_type=Path),
     help="The prior. [default: BRRP_PRIOR, else the one in the user's data folder]",
 )
+# Of what only reads it.
+read_prior_option = click.option(
+    "--prior",
+    type=click.Path(path_type=Path),
+    help="The prior. [default: BRRP_PRIOR, else the one in the user's data folder, else the"
+    " starter prior]",
+)
 clip_option = click.option(
     "--clip-dir",
     type=click.Path(path_type=Path),
@@ -142,7 +149,7 @@ def merge(priors: tuple[Path, ...], out: Path, overwrite: bool, clip_dir: Path |
 
 
 @command.command("list")
-@prior_option
+@read_prior_option
 @json_option
 def list_objects(prior: Path | None, as_json: bool) -> None:
     """Print the name and the phrase of each object, with a tab between them.
@@ -167,7 +174,7 @@ def list_objects(prior: Path | None, as_json: bool) -> None:
 
 @command.command("show")
 @click.argument("name")
-@prior_option
+@read_prior_option
 @click.option(
     "-o",
     "--output",
