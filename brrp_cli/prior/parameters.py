@@ -83,12 +83,22 @@ class RepairConfig:
 
 
 @dataclass(frozen=True)
+class ColoursConfig:
+    """Colours of vertices from a texture: those of `cuts` ** 2 places on each face are fitted, in
+    `steps` steps."""
+
+    cuts: int = 2
+    steps: int = 8
+
+
+@dataclass(frozen=True)
 class MeshConfig:
     """The mesh that is kept: its faces are divided until no edge is longer than `edge`, a share of
     the largest half-extent, as long as there are no more than `faces` of them."""
 
     edge: float = 0.05
     faces: int = 40_000
+    colours: ColoursConfig = field(default_factory=ColoursConfig)
 
 
 @dataclass(frozen=True)

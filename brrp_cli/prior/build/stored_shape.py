@@ -7,17 +7,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from brrp_cli.dependencies import import_open3d
 from brrp_cli.prior.build.coloured_mesh import PaintedMesh
+from brrp_cli.prior.build.vertex_colours import vertex_colours
 from brrp_cli.prior.distance_field import distance_field
 from brrp_cli.prior.parameters import FieldConfig, MeshConfig
 from brrp_cli.prior.shape import StoredShape
-from brrp_cli.raycast import raycasting_scene
 
 if TYPE_CHECKING:
     import trimesh
-
-GREY = 150
 
 
 def stored_shape(
@@ -40,7 +37,7 @@ def stored_shape(
     return StoredShape(
         kept,
         faces.astype(np.int32),
-        colours_at(painted, in_painted),
+        vertex_colours(painted, in_painted, faces, config.colours),
         distance_field(mesh, distances),
     )
 
@@ -62,25 +59,3 @@ def subdivided(
 def _longest_edge(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> float:
     corners = vertices[faces]
     return float(np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=-1).max())
-
-
-def colours_at(painted: PaintedMesh, points: NDArray[np.floating]) -> NDArray[np.uint8]:
-    """RGB (n, 3) at the nearest points of a coloured mesh to points (n, 3) in its frame; grey where
-    it has no colour."""
-    o3d = import_open3d()
-    parts = [part.copy() for part, _ in painted.parts]
-    # Rays and distances are float32: far from the origin they lose the shape.
-    center = painted.vertices.mean(axis=0)
-    for part in parts:
-        part.apply_translation(-center)
-    query = o3d.core.Tensor(np.ascontiguousarray(points - center, dtype=np.float32))
-    found = raycasting_scene(parts).compute_closest_points(query)
-    part_of = found["geometry_ids"].numpy().astype(np.int64)
-    face = found["primitive_ids"].numpy().astype(np.int64)
-    uv = found["primitive_uvs"].numpy()
-    weights = np.column_stack([1 - uv.sum(axis=1), uv])
-    rgb = np.full((len(points), 3), np.nan, np.float32)
-    for index, (_, paint) in enumerate(painted.parts):
-        here = part_of == index
-        rgb[here] = paint.at(face[here], weights[here])
-    return np.nan_to_num(rgb, nan=GREY).round().clip(0, 255).astype(np.uint8)

@@ -12,7 +12,8 @@ from brrp_cli.geometry import similarity, transform_points
 from brrp_cli.prior.build.coloured_mesh import load_painted, unpainted
 from brrp_cli.prior.build.find_meshes import MeshSource
 from brrp_cli.prior.build.make_object import make_object
-from brrp_cli.prior.build.stored_shape import GREY, colours_at, stored_shape, subdivided
+from brrp_cli.prior.build.stored_shape import stored_shape, subdivided
+from brrp_cli.prior.build.vertex_colours import GREY, colours_at
 from brrp_cli.prior.parameters import AppearanceConfig, BuildParameters, FieldConfig, MeshConfig
 
 
