@@ -122,6 +122,18 @@ class HypothesisPosterior:
         mine = [isinstance(m, PlacedShape) and m.taken_for == name for m in self.means]
         return float(self.weights[mine].sum())
 
+    def heaviest(self) -> HypothesisPosterior:
+        """What it would be if the hypothesis with the greatest weight were right."""
+        number = int(np.argmax(self.weights))
+        of = self.which == number
+        return replace(
+            self,
+            means=(self.means[number],),
+            which=np.zeros(int(of.sum()), np.int64),
+            shares=self.shares[of] / self.shares[of].sum(),
+            correction=replace(self.correction, weights=self.correction.weights[of]),
+        )
+
     def logits(self, points: NDArray[np.floating]) -> NDArray[np.float32]:
         """m + w . phi (P, n) at points (n, 3), metres, camera frame."""
         return np.asarray(self._means(points) + self.correction.logits(points))

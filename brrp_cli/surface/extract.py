@@ -71,6 +71,11 @@ def extract_surface(
     volume = posterior.probability_volume(axes)
     check_finite("The posterior", occupancy=volume)
     found = level_set(volume, axes, observed, config.level, config)
+    if found is None and isinstance(posterior, HypothesisPosterior):
+        # Hypotheses that disagree may leave no place that is the object's more probably than not.
+        # It lies somewhere: the heaviest of them is the best guess.
+        volume = posterior.heaviest().probability_volume(axes)
+        found = level_set(volume, axes, observed, config.level, config)
     if found is None:
         return None
     uncertainty = posterior.surface_uncertainty(found.vertices)

@@ -189,6 +189,18 @@ def test_the_weight_of_a_hypothesis_is_that_of_all_its_particles(shapes):
     assert found.dominant == 1
 
 
+def test_the_heaviest_hypothesis_alone_is_the_mean_of_its_own_particles():
+    both = mixed()
+    points = CENTER + np.random.default_rng(1).uniform(-0.009, 0.009, (50, 3))
+    # The first has one particle and half of the weight.
+    occupied = 1 / (1 + np.exp(-both.logits(points)))
+    np.testing.assert_allclose(both.heaviest().probability(points), occupied[0], atol=1e-6)
+    second = replace(both, shares=np.array([0.1, 0.3, 0.6])).heaviest()
+    expected = (occupied[1] + 2 * occupied[2]) / 3
+    np.testing.assert_allclose(second.probability(points), expected, atol=1e-6)
+    assert second.weights == pytest.approx([1])
+
+
 def test_the_file_gives_the_same_probabilities_and_the_same_bytes(tmp_path):
     two = mixed()
     plain = two.correction
