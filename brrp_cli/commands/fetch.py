@@ -7,9 +7,17 @@ from shlex import quote
 
 import click
 
+from brrp_cli.retrieval.clip.manifest import PRECISIONS as CLIP_PRECISIONS
+from brrp_cli.retrieval.clip.manifest import read_clip_manifest
 from brrp_cli.retrieval.clip.model_files import CLIP_DIR_VARIABLE, clip_cache, named_clip_folder
+from brrp_cli.segmentation.prompted.mask_files import PRECISIONS as MASK_PRECISIONS
+from brrp_cli.segmentation.prompted.mask_files import (
+    find_mask_files,
+    masks_folder,
+    read_mask_manifest,
+)
 
-PRECISIONS = {"clip": ("full", "8bit"), "masks": ("full", "4bit")}
+PRECISIONS = {"clip": CLIP_PRECISIONS, "masks": MASK_PRECISIONS}
 MESHES = ("ycb", "household")
 
 
@@ -17,7 +25,7 @@ MESHES = ("ycb", "household")
 @click.argument("what", type=click.Choice([*PRECISIONS, *MESHES]))
 @click.option(
     "--precision",
-    type=click.Choice(["full", "8bit", "4bit"]),
+    type=click.Choice(list(dict.fromkeys([*CLIP_PRECISIONS, *MASK_PRECISIONS]))),
     default="full",
     show_default=True,
     help="clip: full 601 MB, 8bit 154 MB. masks: full 764 MB, 4bit 196 MB. The same weights, "
@@ -93,7 +101,6 @@ def command(
 
 def _clip(precision: str, clip_dir: Path | None, source: str | None) -> None:
     from brrp_cli.fetch.fetch import fetch
-    from brrp_cli.retrieval.clip.manifest import read_clip_manifest
     from brrp_cli.retrieval.clip.model_files import find_clip_files
     from brrp_cli.retrieval.clip.text import ClipTokenizer
 
@@ -111,11 +118,6 @@ def _clip(precision: str, clip_dir: Path | None, source: str | None) -> None:
 
 def _masks(precision: str, masks_dir: Path | None, source: str | None) -> None:
     from brrp_cli.fetch.fetch import fetch
-    from brrp_cli.segmentation.prompted.mask_files import (
-        find_mask_files,
-        masks_folder,
-        read_mask_manifest,
-    )
 
     folder = masks_folder(masks_dir)
     brought, files = 0, []

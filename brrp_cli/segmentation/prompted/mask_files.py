@@ -12,6 +12,7 @@ from brrp_cli.fetch.fetch import RemoteFile
 
 MANIFEST = Path(__file__).parents[2] / "data_manifests" / "masks.toml"
 MASKS_DIR_VARIABLE = "BRRP_MASKS_DIR"
+# Of the detector; the segmenter has one alone.
 PRECISIONS = ("full", "4bit")
 # Part -> where it may lie below the folder, the best first.
 _PLACES = {
