@@ -20,7 +20,7 @@ TRACK = TrackConfig()
 
 @pytest.fixture
 def session(monkeypatch):
-    monkeypatch.setitem(METHODS, METHOD.name, replace(METHOD, object_by_object=True))
+    monkeypatch.setitem(METHODS, METHOD.name, METHOD)
     return Reconstructor(method="sphere", track=True)
 
 

@@ -64,7 +64,7 @@ def inferred(monkeypatch):
         asked.append(sorted(setup.only))
         return replace(METHOD.run(replace(frame, segmap=segmap), setup), frame=frame)
 
-    monkeypatch.setitem(METHODS, "sphere", replace(METHOD, run=run, object_by_object=True))
+    monkeypatch.setitem(METHODS, "sphere", replace(METHOD, run=run))
     return asked
 
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from sphere_method import METHOD
@@ -35,7 +33,7 @@ def made(monkeypatch):
         return real(frame, *args, **kwargs)
 
     monkeypatch.setattr(module, "segment_and_aside", counted)
-    monkeypatch.setitem(METHODS, METHOD.name, replace(METHOD, object_by_object=True))
+    monkeypatch.setitem(METHODS, METHOD.name, METHOD)
     return frames
 
 
@@ -114,7 +112,7 @@ def test_masks_of_a_frame_that_failed_are_no_ones(made, monkeypatch):
         with pytest.raises(FrameError):
             session(shown)
         monkeypatch.undo()
-        monkeypatch.setitem(METHODS, METHOD.name, replace(METHOD, object_by_object=True))
+        monkeypatch.setitem(METHODS, METHOD.name, METHOD)
         assert len(session(shown).objects) == len(full.object_ids) != len(empty.object_ids)
 
 

@@ -31,10 +31,7 @@ class Interval:
 
 
 def cluster_bootstrap(
-    sums: Floats,
-    statistic: Callable[[Floats], Floats],
-    rng: np.random.Generator,
-    rounds: int = ROUNDS,
+    sums: Floats, statistic: Callable[[Floats], Floats], rng: np.random.Generator
 ) -> tuple[float, float, float]:
     """Value and interval of a statistic of sums over clusters.
 
@@ -45,7 +42,7 @@ def cluster_bootstrap(
     clusters = len(sums)
     if clusters < 2:
         return value, math.nan, math.nan
-    draws = rng.multinomial(clusters, np.full(clusters, 1 / clusters), size=rounds)
+    draws = rng.multinomial(clusters, np.full(clusters, 1 / clusters), size=ROUNDS)
     values = statistic(draws @ sums)
     tail = (1 - COVERAGE) / 2 * 100
     # A draw may hold only scenes without a value.

@@ -76,7 +76,7 @@ class Setup:
     weights : others than the method's own, of a method that was trained
     workers : objects at a time; None = as many as there are cores. Results do not depend on it
     helpers : processes that do some of the objects, for a method that `takes_helpers`
-    only : the ids that are asked for, for a method that works `object_by_object`; None = all
+    only : the ids that are asked for, None = all; a method may do others in vain
     given : ids of the masks that somebody gave, None = all; brrp made the others
     image : `Reconstruction.image` of the same frame with other masks
     stream : of which the frame is one, for a method that remembers; None = the frame stands alone
@@ -118,7 +118,6 @@ class Method:
     try_masks : which stored objects lie in each of other masks, without their shapes; None for a
         method that weighs no placements
     takes_helpers : whether it lets other processes do some of the objects
-    object_by_object : whether it does no work for ids that `Setup.only` leaves out
     gives_shapes : whether it reconstructs, or is there to be measured alone
     """
 
@@ -135,7 +134,6 @@ class Method:
     uses_cuda: bool = False
     try_masks: Callable[[Frame, Setup, Trial], list[ObjectReconstruction]] | None = None
     takes_helpers: bool = False
-    object_by_object: bool = False
     gives_shapes: bool = True
 
     @property

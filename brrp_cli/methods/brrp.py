@@ -121,6 +121,5 @@ METHOD = Method(
     check_prior=_check_prior,
     try_masks=_try_masks,
     uses_cuda=True,
-    object_by_object=True,
     takes_helpers=True,
 )

@@ -16,13 +16,10 @@ log = logging.getLogger(__name__)
 
 
 def with_surface(
-    object_id: int,
-    infer: Callable[[], ObjectReconstruction],
-    surface: SurfaceConfig,
-    level: int = logging.WARNING,
+    object_id: int, infer: Callable[[], ObjectReconstruction], surface: SurfaceConfig
 ) -> ObjectReconstruction:
     """What `infer` says of one object, with its surface, `guarded`."""
-    return guarded(object_id, lambda: checked(infer(), surface), level)
+    return guarded(object_id, lambda: checked(infer(), surface))
 
 
 def guarded(

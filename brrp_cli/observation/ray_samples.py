@@ -20,7 +20,6 @@ from brrp_cli.observation.borne import supporting_plane
 from brrp_cli.observation.subsample import grid_subsample
 from brrp_cli.observation.support_plane import Plane, floor_beneath
 from brrp_cli.seeds import child_rng
-from brrp_cli.threads import in_threads
 
 log = logging.getLogger(__name__)
 
@@ -105,14 +104,10 @@ class SceneObservation:
     too_few: dict[int, int] = field(default_factory=dict)
 
 
-def observe(
-    frame: Frame, config: ObservationConfig, seed: int, workers: int = 1
-) -> SceneObservation:
-    """Sample the frame around each of its objects. The same seed gives the same bytes, whatever the
-    number of `workers`, objects at a time."""
+def observe(frame: Frame, config: ObservationConfig, seed: int) -> SceneObservation:
+    """Sample the frame around each of its objects. The same seed gives the same bytes."""
     scene = sampled_scene(frame, config, seed)
-    ids = list(scene.points)
-    objects = dict(zip(ids, in_threads(scene.observation, ids, workers), strict=True))
+    objects = {object_id: scene.observation(object_id) for object_id in scene.points}
     return SceneObservation(plane=scene.plane, objects=objects, too_few=scene.too_few)
 
 

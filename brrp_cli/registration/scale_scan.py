@@ -6,7 +6,6 @@ RANSAC on triples of matches; the scale with most inlier pairs wins.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -60,16 +59,13 @@ def register(
     features: FeatureConfig,
     config: RegistrationConfig,
     seed: int,
-    *,
-    scales: Iterable[float] | None = None,
 ) -> Placement | None:
     """Place a stored object at the scale of the scan with most inlier pairs.
 
-    scales : the members of the scan to try, all by default. Returns None when no scale has
-    an inlier. The first of equal scales wins.
+    None when no scale has an inlier. The first of equal scales wins.
     """
     best: Placement | None = None
-    for scale in features.scales if scales is None else scales:
+    for scale in features.scales:
         source = stored.clouds[scale]
         match_seed = child_seed(seed, "ransac", stored.name, str(scale))
         found = match_features(source, observed.cloud, config, match_seed)

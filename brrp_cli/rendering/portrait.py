@@ -14,10 +14,11 @@ from brrp_cli.rendering.render import View, fitted, render
 DIRECTION = np.array([1.0, -1.6, 0.9])
 # In diagonals of the object: far enough for little perspective.
 DISTANCE = 3.0
+SIZE = 480  # pixels
 
 
-def portrait(item: PriorObject, size: int = 480) -> NDArray[np.uint8]:
-    """(size, size, 3) picture of the object in its most probable resting pose, z up."""
+def portrait(item: PriorObject) -> NDArray[np.uint8]:
+    """(SIZE, SIZE, 3) picture of the object in its most probable resting pose, z up."""
     metres = item.half_extent * np.asarray(item.shape.vertices, dtype=np.float64) + item.center
     standing: NDArray[np.float64] = transform_points(item.poses[0].T_plane_object, metres).astype(
         np.float64
@@ -32,9 +33,9 @@ def portrait(item: PriorObject, size: int = 480) -> NDArray[np.uint8]:
     )
     eye = (low + high) / 2 + DISTANCE * diagonal * normalise(DIRECTION)
     view = View(
-        np.array([[size, 0, size / 2], [0, size, size / 2], [0, 0, 1.0]]),
+        np.array([[SIZE, 0, SIZE / 2], [0, SIZE, SIZE / 2], [0, 0, 1.0]]),
         _looking(eye, (low + high) / 2),
-        (size, size),
+        (SIZE, SIZE),
     )
     return render([surface], [item.shape.colours], fitted(view, [surface]))
 

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 # Of what is no object, points further than this from the objects' box are left out, metres.
 SURROUNDINGS = 0.25
 MOST_POINTS = 120_000
-PLAN_SCENE = "scene.glb"
+PLAN_SCENE = "plan/scene.glb"
 
 
 def observed_points(
@@ -71,12 +71,12 @@ def page_glb(stored: StoredResult) -> bytes:
     return bytes(scene.export(file_type="glb"))
 
 
-def collision_parts(stored: StoredResult, folder: str = "plan") -> dict[str, trimesh.Trimesh]:
+def collision_parts(stored: StoredResult) -> dict[str, trimesh.Trimesh]:
     """The convex parts that `brrp export` wrote into the results, by name, in the frame of the
     meshes."""
     import trimesh
 
-    path: Path = stored.folder / folder / PLAN_SCENE
+    path: Path = stored.folder / PLAN_SCENE
     if not path.is_file():
         return {}
     scene = trimesh.load_scene(path)

@@ -92,12 +92,6 @@ def test_no_inlier_at_any_scale_gives_no_placement():
     assert register(observed, stored(drill()), FEATURES, CONFIG, 0) is None
 
 
-def test_the_scan_can_be_narrowed_to_some_scales():
-    mesh = drill()
-    observed = observed_cloud(seen_from_the_origin(placed_at(mesh, 0.12)), FEATURES)
-    assert register(observed, stored(mesh), FEATURES, CONFIG, 0, scales=[0.65]).scale == 0.65
-
-
 def placed_at(mesh, size):
     placed = mesh.copy()
     placed.apply_scale(size)
