@@ -54,6 +54,7 @@ class Helpers:
     def start(self) -> None:
         """Start those that are not there, in the background."""
         with self._lending:
+            self._let_lost_go()
             # Not once closed, and not for ever where every one is lost.
             while self._end.alive and len(self._helpers) < self.count and self._lost <= MOST_LOST:
                 self._helpers.append(Helper(self._modules))
@@ -70,7 +71,9 @@ class Helpers:
     @property
     def any_ready(self) -> bool:
         """Whether one has started."""
-        return any(helper.is_ready() for helper in list(self._helpers))
+        # Of two threads that ask one helper, one would take its word, and the other wait for it.
+        with self._lending:
+            return any(helper.is_ready() for helper in self._helpers)
 
     @property
     def processes(self) -> list[int]:
@@ -91,11 +94,14 @@ class Helpers:
             with self._lending:
                 if helper is not None:
                     helper.busy = False
-                lost = [each for each in self._helpers if each.is_lost]
-                self._lost += len(lost)
-                for each in lost:
-                    self._helpers.remove(each)
-                    each.close()
+                self._let_lost_go()
+
+    def _let_lost_go(self) -> None:
+        """Under the lock. One that another thread has in hand goes once that gives it back."""
+        for each in [each for each in self._helpers if each.is_lost and not each.busy]:
+            self._lost += 1
+            self._helpers.remove(each)
+            each.close()
 
 
 class Helper:

@@ -97,6 +97,17 @@ def test_one_that_dies_is_replaced_but_not_for_ever(monkeypatch):
     helpers.close()
 
 
+def test_one_that_never_starts_is_replaced_but_not_for_ever():
+    helpers = Helpers(1, ["no_such_module"])
+    for _ in range(module.MOST_LOST + 1):
+        helpers.start()
+        assert helpers.processes
+        helpers.wait()
+        assert not helpers.any_ready
+    helpers.start()
+    assert not helpers.processes
+
+
 def test_one_that_hangs_is_given_up(monkeypatch):
     monkeypatch.setattr(module, "PATIENCE", 30.0)
     helpers = Helpers(1)
