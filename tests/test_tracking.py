@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -17,8 +18,9 @@ from brrp_cli.geometry import backproject
 from brrp_cli.methods import base
 from brrp_cli.methods.registry import METHODS
 from brrp_cli.raycast import look
-from brrp_cli.reconstruction import ObjectReconstruction
+from brrp_cli.reconstruction import OK, ObjectReconstruction
 from brrp_cli.shapes import solids
+from brrp_cli.tracking import tracker
 from brrp_cli.tracking.followed import first_frame, follow
 from brrp_cli.tracking.motion import at_rest, camera_motion, spread_out
 
@@ -227,3 +229,17 @@ def test_of_many_views_those_from_the_most_different_sides_are_kept():
     assert spread_out(directions, 4) == [0, 2, 3, 4]
     assert spread_out(directions, 5) == [0, 1, 2, 3, 4]
     assert spread_out(directions[:0], 3) == []
+
+
+def test_a_view_whose_camera_is_not_known_is_not_kept(monkeypatch):
+    """Names stand for frames and for what is remembered of them."""
+    moved = {name: np.eye(4) for name in ("right", "left", "above")}
+    for name, place in (("right", (1, 0, 0)), ("left", (-1, 0, 0)), ("above", (0, -1, 0))):
+        moved[name][:3, 3] = place
+    monkeypatch.setattr(tracker, "camera_motion", lambda then, now, config: moved.get(then))
+    memory = SimpleNamespace(alone=False)
+    item = ObjectReconstruction(7, OK, center=np.array([0, 0, 1.0]), memory=memory)
+    found = tracker.Tracker(TrackConfig(), 0.1)
+    found._seen[7] = [(name, name) for name in ("lost", "right", "left", "above")]
+    found._remember("now", [item], SharpenConfig(views=3))
+    assert found._seen[7] == [("left", "left"), ("above", "above"), ("now", memory)]

@@ -283,11 +283,13 @@ class Tracker:
             memory, item.memory = item.memory, None
             if memory is None or item.center is None:
                 continue
-            views = [] if memory.alone else self._seen.get(item.object_id, [])
-            motions = [camera_motion(then, frame, self._config) for then, _ in views]
-            toward = [T[:3, 3] - item.center for T in motions if T is not None]
+            earlier = [] if memory.alone else self._seen.get(item.object_id, [])
+            motions = [camera_motion(then, frame, self._config) for then, _ in earlier]
+            # Of a view whose camera is not known to this one, nobody knows the side.
+            known = [(each, T) for each, T in zip(earlier, motions, strict=True) if T is not None]
+            toward = [T[:3, 3] - item.center for _, T in known]
             kept = spread_out(normalise(np.reshape(toward, (-1, 3))), config.views - 1)
-            self._seen[item.object_id] = [*(views[i] for i in kept), (frame, memory)]
+            self._seen[item.object_id] = [*(known[i][0] for i in kept), (frame, memory)]
 
     def _only(self, ids: Collection[int]) -> list[tuple[Frame, Reconstruction]]:
         """What was made of earlier frames, of the objects `ids`."""
