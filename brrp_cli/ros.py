@@ -6,6 +6,7 @@ Messages are taken by their fields, so that those of rclpy, rospy and rosbags wi
 
 from __future__ import annotations
 
+import logging
 import threading
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -14,11 +15,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from brrp_cli.errors import BrrpError
+from brrp_cli.errors import BrrpError, unexpected
 from brrp_cli.frames.frame import Frame
 from brrp_cli.frames.ros_images import frame_of
 from brrp_cli.reconstruction import ObjectReconstruction, Reconstruction
 from brrp_cli.surface.painting import surface_colours
+
+log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
@@ -122,5 +125,9 @@ class Newest:
                 result = self._work(*messages)
             except BrrpError as error:
                 self._tell(str(error))
+                continue
+            except Exception as error:  # a library stumbled over this one; the next may be well
+                log.debug("Newest", exc_info=True)
+                self._tell(str(unexpected(error)))
                 continue
             self._give(result, messages)

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import ast
 import threading
+import time
 from pathlib import Path
 
 import numpy as np
@@ -116,6 +117,22 @@ def test_the_newest_is_worked_on_and_errors_end_nothing():
     newest.close()
     assert given == [(10, (1,)), (40, (4,))]
     assert told == ["three"]
+
+
+def test_an_error_that_nobody_thought_of_ends_nothing():
+    told, given = [], threading.Semaphore(0)
+
+    def work(number):
+        return 1 / number
+
+    newest = Newest(work, lambda result, messages: given.release(), told.append)
+    newest.put(0)
+    while not told:
+        time.sleep(0.01)
+    newest.put(1)
+    assert given.acquire(timeout=10)
+    newest.close()
+    assert len(told) == 1 and "ZeroDivisionError" in told[0]
 
 
 def test_the_node_names_fields_and_types_that_ros_has():
