@@ -221,17 +221,18 @@ def _ranked(
     """The best grasps that are far enough from each other and that no neighbour is in the way of,
     exactly."""
     config, item = task.config, task.item
-    score = (closed.holds * ~low).mean(axis=0) * carries(poses, closed, item, config)
+    held = (closed.holds * ~low).mean(axis=0)
+    score = held * carries(poses, closed, item, config)
     good = quality(poses, closed, item, config)
     enough = score >= max(task.min_score, 1e-9)
     causes = {
-        "object": closed.collides,
-        "missed": closed.misses,
-        "friction": closed.slips,
-        "table": low,
+        "object": closed.collides.mean(axis=0),
+        "missed": closed.misses.mean(axis=0),
+        "friction": closed.slips.mean(axis=0),
+        "table": low.mean(axis=0),
+        "weight": held - score,
     }
-    share = np.stack([cause.mean(axis=0) for cause in causes.values()])
-    worst = share.argmax(axis=0) if share.size else np.zeros(0, int)
+    worst = np.stack([*causes.values()]).argmax(axis=0)
     for i, why in enumerate(causes):
         fell[why] = fell.get(why, 0) + int((~enough & (worst == i)).sum())
     fell |= {"similar": 0, "more": 0}
@@ -247,7 +248,7 @@ def _ranked(
             fell["neighbour"] += 1
         else:
             grasps.append(_grasp(item, poses, closed, int(i), float(score[i]), float(good[i])))
-    return ObjectGrasps(item.object_id, grasps, fell, "" if grasps else _why(fell))
+    return ObjectGrasps(item.object_id, grasps, fell, "" if grasps else why_none(fell))
 
 
 def _grasp(
@@ -287,18 +288,20 @@ REASONS = {
     "object": "the hand would run into the object before it closes",
     "missed": "a finger would meet nothing",
     "friction": "it would slip out",
+    "weight": "its weight would turn it in the hand",
 }
+NOWHERE = "its posterior has no surface to take hold of"
 
 
-def _why(fell: dict[str, int]) -> str:
+def why_none(fell: dict[str, int]) -> str:
     """The last reason for which candidates fell, of those that most did for."""
-    last = [key for key in ("object", "missed", "friction") if fell.get(key)]
+    last = [key for key in ("object", "missed", "friction", "weight") if fell.get(key)]
     middle = [key for key in ("neighbour", "table", "approach") if fell.get(key)]
-    early = ["too_wide", "not_antipodal"]
+    early = [key for key in ("too_wide", "not_antipodal") if fell.get(key)]
     for group in (last, middle, early):
         if group:
-            return REASONS[max(group, key=lambda key: fell.get(key, 0))]
-    return "nothing was found"
+            return REASONS[max(group, key=lambda key: fell[key])]
+    return NOWHERE
 
 
 def _some(points: Array, most: int) -> Array:

@@ -17,7 +17,7 @@ from brrp_cli.grasping.draws import Mesh, draw_surfaces, mesh_alone
 from brrp_cli.grasping.gripper_file import open_gripper
 from brrp_cli.grasping.hidden_space import NOTHING_HIDDEN
 from brrp_cli.grasping.obstacles import Obstacles
-from brrp_cli.grasping.plan import plan_grasps
+from brrp_cli.grasping.plan import NOWHERE, plan_grasps, why_none
 from brrp_cli.grasping.scene import GraspObject, GraspScene
 from brrp_cli.observation.support_plane import Plane
 from brrp_cli.physics import GRAVITY
@@ -73,6 +73,17 @@ def test_what_is_wider_than_the_hand_has_none():
     assert "opening" in found.why
     smaller = trimesh.creation.icosphere(3, 0.03).apply_translation([0, 0, 0.03])
     assert grasps(thing(smaller)).grasps
+
+
+def test_what_is_too_heavy_falls_by_its_weight():
+    found = grasps(thing(solids.box(0.05, 0.05, 0.12)), config=GraspConfig(density=1e8))
+    assert found.grasps == [] and found.fell["weight"] > found.fell["object"]
+    assert "its weight" in found.why
+
+
+def test_what_has_no_surface_falls_for_no_other_reason():
+    assert why_none({"points": 0, "too_wide": 0, "not_antipodal": 0}) == NOWHERE
+    assert "opening" in why_none({"points": 9, "too_wide": 5, "not_antipodal": 4})
 
 
 def test_hands_stay_above_the_table():
