@@ -13,7 +13,6 @@ from brrp_cli.commands.export import FOLDER as PLAN_FOLDER
 from brrp_cli.commands.export import export
 from brrp_cli.commands.grasp import JSON, grasp
 from brrp_cli.commands.view import PAGE, title, view
-from brrp_cli.errors import BrrpError
 from brrp_cli.files import atomic_path, parse_json
 from brrp_cli.grasping.record import RECORD as GRASPS
 from brrp_cli.planning.options import PlanOptions
@@ -97,9 +96,11 @@ def _as_asked(stored: StoredResult, name: str, asked: dict[str, Any]) -> bool:
         return False
     try:
         record = parse_json(path.read_text(encoding="utf-8"))
-    except (BrrpError, ValueError):
+    except (OSError, ValueError):
+        return False
+    if not isinstance(record, dict):
         return False
     told = {key: record.get(key) for key in asked}
-    if isinstance(told.get("gripper"), dict):
-        told["gripper"] = told["gripper"].get("name")
+    if isinstance(gripper := told.get("gripper"), dict):
+        told["gripper"] = gripper.get("name")
     return told == asked

@@ -198,6 +198,7 @@ def _check(record: dict[str, Any]) -> None:
     for item in record["objects"]:
         _text(item["status"])
         _text(item["message"])
+        _numbers(item["points"], ())
         if item["mesh"] is not None:
             # A name of another's making could lead out of the folder.
             if item["mesh"] != mesh_name(item["id"]):

@@ -31,10 +31,11 @@ RECORD = {
             "id": 7,
             "status": "ok",
             "message": "",
+            "points": 900,
             "mesh": "object_7.ply",
             "uncertainty_unit": "metre",
         },
-        {"id": -3, "status": "no_surface", "message": "none", "mesh": None},
+        {"id": -3, "status": "no_surface", "message": "none", "points": 0, "mesh": None},
     ],
 }
 VALUES = [None, True, 8, -1.5, 1e999, "a", "../../object_7.ply", [], [0], {}, {"a": []}, [[[]]]]
@@ -85,6 +86,7 @@ def test_any_value_in_any_place_is_refused_or_harmless(place, tmp_path: Path) ->
         assert len(set(stored.object_ids)) == len(stored.object_ids)
         for item in stored.record["objects"]:
             assert item["mesh"] in (None, f"object_{item['id']}.ply")
+            assert np.isfinite(float(item["points"]))
 
 
 @pytest.mark.parametrize(
