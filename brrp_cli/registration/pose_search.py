@@ -1,8 +1,9 @@
 """Many hypotheses of where a stored object is: begin widely, refine the best, verify all.
 
-The paper's scan (scan.py) takes the one placement with most inlier pairs, at ten fixed sizes. Here
-a stored object keeps its own size, or one near it; initial are resting poses turned about the
-table's normal and feature matchings; what decides is what the whole image says (verifier.py).
+The paper's scan (scale_scan.py) takes the one placement with most inlier pairs, at ten fixed sizes.
+Here a stored object keeps its own size, or one near it. The search begins with resting poses turned
+about the table's normal, with leaning ones and with feature matchings; what decides is what the
+whole image says (verification.py).
 """
 
 from __future__ import annotations
