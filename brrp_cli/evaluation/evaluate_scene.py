@@ -29,7 +29,6 @@ from brrp_cli.ground_truth.true_meshes import close_truth
 from brrp_cli.ground_truth.true_shape import TrueShape, true_shape
 from brrp_cli.methods.base import Setup
 from brrp_cli.methods.registry import METHODS
-from brrp_cli.prior.objects import PriorObject
 from brrp_cli.prior.store import Prior, open_prior
 from brrp_cli.reconstruction import FAILED, ObjectReconstruction, Reconstruction
 from brrp_cli.retrieval.base import unknown
@@ -169,11 +168,6 @@ def _found_retriever(
     return choose_retriever(name, _prior(prior), config, seed, clip_dir=clip_dir)
 
 
-@cache
-def _stored(prior: Path, name: str) -> PriorObject:
-    return _prior(prior).load(name)
-
-
 def _row(
     plan: Plan,
     scene: Scene,
@@ -229,7 +223,7 @@ def _row(
     if placed and plan.prior is not None:
         # Without weights, the most probable.
         best = max(placed, key=lambda each: each.weight or 0.0)
-        stored = _stored(plan.prior, best.name)
+        stored = _prior(plan.prior).load(best.name)
         row["placement_error"] = placement_error(best, stored, truth.shape)
     return row
 
