@@ -13,6 +13,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from brrp_cli.geometry import grid_nodes
+
 if TYPE_CHECKING:
     from brrp_cli.observation.support_plane import Plane
 
@@ -70,7 +72,7 @@ class Gripper:
     def corners(self, openings: NDArray[np.floating], back: float = 0.0) -> Array:
         """(n, 24, 3) corners of `boxes`."""
         boxes = self.boxes(openings, back)
-        pick = np.stack(np.meshgrid([0, 1], [0, 1], [0, 1], indexing="ij"), axis=-1).reshape(8, 3)
+        pick = grid_nodes([np.arange(2)] * 3).reshape(8, 3)
         return np.asarray(boxes[:, :, pick, np.arange(3)].reshape(len(boxes), 24, 3))
 
     def lowest(self, T_cam_gripper: Array, openings: NDArray[np.floating], plane: Plane) -> Array:

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from brrp_cli.config.grasping import GraspConfig, SurroundingsConfig
 from brrp_cli.dependencies import import_library
+from brrp_cli.geometry import grid_nodes
 from brrp_cli.grasping.closing import runs_into
 from brrp_cli.grasping.draws import Mesh, mesh_alone
 from brrp_cli.grasping.gripper import Gripper
@@ -104,7 +105,7 @@ def _points_within(boxes: Array, config: SurroundingsConfig) -> Array:
     """(n, k, 3) points of boxes (n, b, 2, 3), from end to end."""
     counts = (config.across, config.across, config.along)
     shares = [np.linspace(0, 1, count) for count in counts]
-    share = np.stack(np.meshgrid(*shares, indexing="ij"), axis=-1).reshape(-1, 3)
+    share = grid_nodes(shares).reshape(-1, 3)
     low, high = boxes[:, :, None, 0], boxes[:, :, None, 1]
     count = boxes.shape[1] * len(share)
     return np.asarray((low + share * (high - low)).reshape(len(boxes), count, 3))

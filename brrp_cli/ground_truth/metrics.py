@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from brrp_cli.geometry import grid_nodes
+
 if TYPE_CHECKING:
     import trimesh
 
@@ -27,7 +29,7 @@ def evaluation_grid(
     """
     steps = int(np.floor(half_width / spacing + 1e-9))
     axis = np.arange(-steps, steps + 1) * spacing
-    nodes = np.stack(np.meshgrid(axis, axis, axis, indexing="ij"), axis=-1).reshape(-1, 3)
+    nodes = grid_nodes([axis] * 3).reshape(-1, 3)
     return np.asarray(nodes + np.asarray(center, dtype=np.float64))
 
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from brrp_cli.frames.frame import Frame
 from brrp_cli.frames.projection import depth_behind
-from brrp_cli.geometry import transform_points
+from brrp_cli.geometry import grid_nodes, transform_points
 from brrp_cli.ground_truth.metrics import evaluation_grid, sample_surface
 from brrp_cli.ground_truth.true_meshes import ClosedMeshes
 from brrp_cli.raycast import inside
@@ -65,7 +65,7 @@ def true_shape(meshes: ClosedMeshes, frame: Frame, rng: np.random.Generator) -> 
     world = evaluation_grid(box.mean(axis=0), HALF_WIDTH, SPACING)
     T_world_grid = np.diag([SPACING, SPACING, SPACING, 1.0])
     T_world_grid[:3, 3] = world[0]
-    near = _lattice(box[0] - NEAR_MARGIN, box[1] + NEAR_MARGIN)
+    near = _near_grid(box[0] - NEAR_MARGIN, box[1] + NEAR_MARGIN)
 
     seen = meshes.moved(T_cam_world)
     center = np.asarray(seen.exact.bounds).mean(axis=0)
@@ -98,10 +98,10 @@ def behind_seen(points: Points, frame: Frame) -> Flags:
     return np.asarray(depth_behind(points, frame) < 0)
 
 
-def _lattice(low: Points, high: Points) -> Points:
+def _near_grid(low: Points, high: Points) -> Points:
     """Points (n, 3), `NEAR_SPACING` apart, symmetric in the box from low (3,) to high (3,)."""
     axes = []
     for start, stop in zip(low, high, strict=True):
         steps = int(np.floor((stop - start) / NEAR_SPACING))
         axes.append((start + stop) / 2 + (np.arange(steps + 1) - steps / 2) * NEAR_SPACING)
-    return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
+    return grid_nodes(axes).reshape(-1, 3)

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brrp_cli.dependencies import import_open3d
+from brrp_cli.geometry import grid_nodes
 from brrp_cli.prior.parameters import FieldConfig
 from brrp_cli.raycast import surface_scene
 
@@ -150,8 +151,7 @@ def _nodes(
     shape = np.ceil((high - low) / spacing).astype(np.int64) + 1
     lower = (low + high) / 2 - (shape - 1) * spacing / 2
     axes = [start + spacing * np.arange(n) for start, n in zip(lower, shape, strict=True)]
-    nodes = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
-    return lower, spacing, np.ascontiguousarray(nodes, dtype=np.float32)
+    return lower, spacing, np.ascontiguousarray(grid_nodes(axes), dtype=np.float32)
 
 
 def _as_kept(values: NDArray[np.floating]) -> NDArray[np.float32]:

@@ -34,7 +34,7 @@ from numpy.typing import NDArray
 from brrp_cli.config import ColourConfig, LikelihoodConfig
 from brrp_cli.frames.dilate import dilated
 from brrp_cli.frames.frame import BACKGROUND, Frame
-from brrp_cli.geometry import bounds, transform_points
+from brrp_cli.geometry import bounds, grid_nodes, transform_points
 from brrp_cli.observation.pixel_noise import PixelNoise
 from brrp_cli.observation.support_plane import Plane
 from brrp_cli.registration.colour_pose import colour_agreement
@@ -266,8 +266,7 @@ def _window(T_cam_model: Array, model: Model, seen: SeenObject) -> tuple[slice, 
 
 
 def _corners(model: Model) -> Array:
-    sides = zip(*bounds(model.surface), strict=True)
-    return np.stack(np.meshgrid(*sides, indexing="ij"), axis=-1).reshape(-1, 3)
+    return grid_nodes(np.stack(bounds(model.surface)).T).reshape(-1, 3)
 
 
 def _patches(

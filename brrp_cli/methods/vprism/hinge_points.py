@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from brrp_cli.geometry import grid_nodes
 from brrp_cli.seeds import child_rng
 
 
@@ -26,7 +27,7 @@ def scene_hinges(
     middles = np.array(list(centers.values()))
     lower, upper = middles.min(axis=0) - radius, middles.max(axis=0) + radius
     axes = [np.arange(a, b + spacing, spacing) for a, b in zip(lower, upper, strict=True)]
-    grid = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
+    grid = grid_nodes(axes).reshape(-1, 3)
     distance = np.linalg.norm(grid[:, None] - middles[None], axis=-1).min(axis=1)
     drawn = [
         child_rng(seed, "hinges", i).choice(p, min(surface, len(p)), replace=False)
