@@ -27,7 +27,7 @@ from brrp_cli.observation.ray_samples import ObjectObservation
 from brrp_cli.observation.soft_samples import SoftSamples, soft_samples
 from brrp_cli.observation.support_plane import Plane
 from brrp_cli.prior.store import Prior
-from brrp_cli.registration.likelihood import SeenObject
+from brrp_cli.registration.likelihood import SeenPixels
 from brrp_cli.registration.model import search_model
 from brrp_cli.registration.pose_search import Hypothesis, start_from
 from brrp_cli.registration.ray_refinement import OtherRays
@@ -83,7 +83,7 @@ class Remembered:
     object_id: int
     plane: Plane | None
     points: Array
-    seen: SeenObject
+    seen: SeenPixels
     samples: SoftSamples
     wave: float
     probabilities: Array
@@ -100,7 +100,7 @@ def remember(
     wave: float,
     observation: ObjectObservation,
     points: Array,
-    seen: SeenObject,
+    seen: SeenPixels,
     probabilities: Array,
     placed: Sequence[tuple[Hypothesis, float]],
     ratios: dict[str, float],

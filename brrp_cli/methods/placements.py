@@ -15,7 +15,7 @@ from brrp_cli.methods.earlier_views import EarlierViews
 from brrp_cli.methods.scene import Scene
 from brrp_cli.observation.ray_samples import ObjectObservation
 from brrp_cli.reconstruction import Retrieved
-from brrp_cli.registration.likelihood import SeenObject, evidence, log_likelihood, see
+from brrp_cli.registration.likelihood import SeenPixels, evidence, log_likelihood, see
 from brrp_cli.registration.model import Model, search_model
 from brrp_cli.registration.pose_search import Hypothesis, search
 from brrp_cli.registration.refined import refined
@@ -102,7 +102,7 @@ class Placer:
         self._config = config
         self._views = views
         self._observed = observed_cloud(observation.points, scene.config.features)
-        self.seen: SeenObject = see(
+        self.seen: SeenPixels = see(
             scene.frame,
             observation.object_id,
             image.plane,

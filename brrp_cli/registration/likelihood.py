@@ -49,7 +49,7 @@ NOISE_ALONE = float(np.sqrt(2 / np.pi))
 
 
 @dataclass(frozen=True)
-class SeenObject:
+class SeenPixels:
     """What a frame shows of one object and around it, on every `stride`-th pixel: (h, w) arrays.
 
     rays : (h, w, 3), z = 1; patch : number of the patch; own : the object's, with depth; beside :
@@ -113,10 +113,10 @@ def see(
     bleed: float,
     config: LikelihoodConfig,
     lost: Mask | None = None,
-) -> SeenObject:
+) -> SeenPixels:
     """One object of a frame, for as many placements as there are.
 
-    patch : metres; bleed : radians by which silhouettes are uncertain; lost : as of `SeenObject`
+    patch : metres; bleed : radians by which silhouettes are uncertain; lost : as of `SeenPixels`
     """
     mask = frame.segmap == object_id
     middle = float(np.median(frame.points[mask & frame.valid][:, 2]))
@@ -134,7 +134,7 @@ def see(
         on_table = plane.signed_distance(frame.points[part]) < config.on_table
     own, background = mask[part] & valid, frame.segmap[part] == BACKGROUND
     across = int(np.ceil(frame.shape[1] / cell)) + 1
-    return SeenObject(
+    return SeenPixels(
         frame=frame,
         plane=plane,
         stride=stride,
@@ -162,7 +162,7 @@ def see(
 def evidence(
     T_cam_model: Array,
     model: Model,
-    seen: SeenObject,
+    seen: SeenPixels,
     config: LikelihoodConfig,
     colour: ColourConfig,
 ) -> PlacementEvidence:
@@ -249,7 +249,7 @@ def misfit(found: PlacementEvidence, config: LikelihoodConfig) -> float:
     return float((found.share * off).sum() / compared / found.patches_per_vote)
 
 
-def _window(T_cam_model: Array, model: Model, seen: SeenObject) -> tuple[slice, slice]:
+def _window(T_cam_model: Array, model: Model, seen: SeenPixels) -> tuple[slice, slice]:
     """The part of the grid that holds the object and the placed model."""
     points = transform_points(T_cam_model, _corners(model))
     rows, columns = (np.flatnonzero(seen.own.any(axis=axis)) for axis in (1, 0))
@@ -275,7 +275,7 @@ def _patches(
     lean: Array,
     patch: NDArray[np.int64],
     fine: NDArray[np.float32],
-    seen: SeenObject,
+    seen: SeenPixels,
     config: LikelihoodConfig,
 ) -> tuple[Array, Array, Array]:
     """Residual, variance and share (n,) of the patches of which enough is compared."""
@@ -296,7 +296,7 @@ def _patches(
 
 
 def _surrounding(
-    shown: Mask, part: tuple[slice, slice], seen: SeenObject, config: LikelihoodConfig
+    shown: Mask, part: tuple[slice, slice], seen: SeenPixels, config: LikelihoodConfig
 ) -> float:
     """How many of the pixels `shown` of a part have the surroundings' colours."""
     rgb = seen.frame.rgb[:: seen.stride, :: seen.stride][part][shown]

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brrp_cli.config import HypothesesConfig, WeighConfig
-from brrp_cli.registration.likelihood import SeenObject, evidence, log_likelihood
+from brrp_cli.registration.likelihood import SeenPixels, evidence, log_likelihood
 from brrp_cli.registration.pose_search import Hypothesis
 
 Array = NDArray[np.float64]
@@ -20,7 +20,7 @@ class SeenFrom:
     """seen : the object in a frame; T_view_cam : (4, 4) rigid, from the present frame's camera to
     that one's"""
 
-    seen: SeenObject
+    seen: SeenPixels
     T_view_cam: Array
 
 
@@ -34,7 +34,7 @@ def counted_once(config: HypothesesConfig, knows_depth: bool) -> HypothesesConfi
 
 def judged(
     placed: list[Hypothesis],
-    seen: SeenObject,
+    seen: SeenPixels,
     config: HypothesesConfig,
     refined: Callable[[Hypothesis], Hypothesis],
 ) -> tuple[list[Hypothesis], list[float]]:

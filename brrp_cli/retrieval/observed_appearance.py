@@ -18,7 +18,7 @@ from brrp_cli.observation.support_plane import Plane
 
 
 @dataclass(frozen=True)
-class SeenObject:
+class ObservedAppearance:
     """One object of a frame.
 
     colours : (k, 3) RGB 0 to 255 and shares : (k,); None where the frame has no colours
@@ -38,7 +38,7 @@ class SeenObject:
 
 def see_object(
     frame: Frame, object_id: int, plane: Plane | None, config: ObservedAppearanceConfig
-) -> SeenObject:
+) -> ObservedAppearance:
     """Describe what is seen of one object."""
     whole = frame.segmap == object_id
     # Only what is around the object matters.
@@ -54,7 +54,9 @@ def see_object(
         colours, shares = palette(frame.rgb[box][inner])
     pairs = _pairs(points, config)
     size = None if plane is None or pairs is None else _size(points, plane, config)
-    return SeenObject(colours, shares, pairs, size, points, _hidden(frame, mask, box, config))
+    return ObservedAppearance(
+        colours, shares, pairs, size, points, _hidden(frame, mask, box, config)
+    )
 
 
 def _without_plane(

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from brrp_cli.config.retrieval import RetrievalConfig
 from brrp_cli.prior.appearance_index import AppearanceSummary
-from brrp_cli.retrieval.observed_appearance import SeenObject
+from brrp_cli.retrieval.observed_appearance import ObservedAppearance
 from brrp_cli.retrieval.similarity import size_penalty
 
 _CHUNK = 1_000
@@ -28,7 +28,9 @@ class Shortlist:
         self._all = np.arange(len(first.colour))
         self.plain = np.asarray(~first.colour.any(axis=1), dtype=np.bool_)
 
-    def rows(self, seen: SeenObject, histograms: NDArray[np.floating] | None) -> NDArray[np.int64]:
+    def rows(
+        self, seen: ObservedAppearance, histograms: NDArray[np.floating] | None
+    ) -> NDArray[np.int64]:
         """Rows (m,) of the table that are to be looked at, ascending."""
         own, weights = self._config.shortlist, self._config.likeness
         plain = self._config.similarity.plain_colour
@@ -46,7 +48,7 @@ class Shortlist:
         return best_of_each(self.plain, lambda kind: self._best_rows(seen, score, kind))
 
     def _best_rows(
-        self, seen: SeenObject, score: NDArray[np.float32], kind: NDArray[np.int64]
+        self, seen: ObservedAppearance, score: NDArray[np.float32], kind: NDArray[np.int64]
     ) -> NDArray[np.int64]:
         """Those of the rows `kind` that are to be looked at, by scores (n,) without size."""
         own = self._config.shortlist

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from brrp_cli.config.retrieval import SimilarityConfig
 from brrp_cli.descriptors.colour_histogram import AB_BINS, colour_histograms
 from brrp_cli.descriptors.descriptor import roots
-from brrp_cli.retrieval.observed_appearance import SeenObject
+from brrp_cli.retrieval.observed_appearance import ObservedAppearance
 from brrp_cli.retrieval.score_fusion import Similarity
 
 
@@ -84,7 +84,7 @@ def size_penalty(
 
 
 def similarity(
-    seen: SeenObject,
+    seen: ObservedAppearance,
     histograms: NDArray[np.floating] | None,
     stored: NDArray[Any],
     rows: NDArray[np.int64],
@@ -102,7 +102,9 @@ def similarity(
     )
 
 
-def lit_histograms(seen: SeenObject, gains: NDArray[np.floating]) -> NDArray[np.float32] | None:
+def lit_histograms(
+    seen: ObservedAppearance, gains: NDArray[np.floating]
+) -> NDArray[np.float32] | None:
     """Histograms (g, b) of the seen colours in each light; None without colours."""
     if seen.colours is None or seen.shares is None:
         return None

@@ -13,7 +13,7 @@ from brrp_cli.descriptors.colour_histogram import (
 from brrp_cli.descriptors.descriptor import to_bytes
 from brrp_cli.descriptors.point_pairs import PAIR_BINS
 from brrp_cli.prior.appearance_index import first_look
-from brrp_cli.retrieval.observed_appearance import SeenObject
+from brrp_cli.retrieval.observed_appearance import ObservedAppearance
 from brrp_cli.retrieval.shortlist import Shortlist, best_of_each
 from brrp_cli.retrieval.similarity import (
     blurred,
@@ -128,7 +128,7 @@ def test_a_shortlist_of_a_large_prior_holds_the_true_object():
     shortlist = Shortlist(first_look(table), RetrievalConfig())
     for true in (7, 1234, 2999):
         size = table["sizes"][true, 0].astype(float)
-        seen = SeenObject(
+        seen = ObservedAppearance(
             None, None, pairs[true, 0].astype(np.float32), size, np.zeros((0, 3)), 0.0
         )
         histograms = np.repeat(colour[true], 9, axis=0).astype(np.float32)
@@ -149,7 +149,7 @@ def test_objects_without_colours_do_not_crowd_out_the_others():
         table[name] = table[name][true]
     table["colour"][:2_700] = 0
     table["colour"][true] = to_bytes(colour[true])
-    seen = SeenObject(
+    seen = ObservedAppearance(
         None,
         None,
         pairs[true, 0].astype(np.float32),
