@@ -116,7 +116,7 @@ def placement_error(placed: Retrieved, stored: PriorObject, truth: TrueShape) ->
     return float(raycasting_scene([mesh]).compute_distance(query).numpy().mean(dtype=np.float64))
 
 
-def level_set(
+def isosurface(
     volume: NDArray[np.floating], T_target_grid: NDArray[np.floating], level: float = LEVEL
 ) -> trimesh.Trimesh | None:
     """Marching cubes at `level` on a volume (nx, ny, nz); vertices in the target frame. None if no
@@ -140,5 +140,5 @@ def _surface_points(
     rng: np.random.Generator,
 ) -> NDArray[np.float64]:
     """Points (count, 3) of the level set; (0, 3) if there is none."""
-    mesh = level_set(volume, T_cam_grid, level)
+    mesh = isosurface(volume, T_cam_grid, level)
     return np.zeros((0, 3)) if mesh is None else sample_surface(mesh, count, rng)

@@ -81,7 +81,12 @@ def f_score(predicted: Points, true: Points, threshold: float = 0.01) -> float:
     """
     if len(predicted) == 0 or len(true) == 0:
         return 0.0
-    precision = np.mean(nearest_distances(predicted, true) <= threshold)
-    recall = np.mean(nearest_distances(true, predicted) <= threshold)
+    forth, back = nearest_distances(predicted, true), nearest_distances(true, predicted)
+    return f_score_of_distances(forth, back, threshold)
+
+
+def f_score_of_distances(forth: Points, back: Points, threshold: float) -> float:
+    """The same of distances (n,) from the prediction to the truth, and (m,) back, metres."""
+    precision, recall = float(np.mean(forth <= threshold)), float(np.mean(back <= threshold))
     total = precision + recall
-    return float(2 * precision * recall / total) if total > 0 else 0.0
+    return 2 * precision * recall / total if total > 0 else 0.0

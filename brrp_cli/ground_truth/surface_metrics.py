@@ -17,6 +17,7 @@ from brrp_cli.dependencies import import_open3d
 from brrp_cli.frames.frame import Frame
 from brrp_cli.frames.projection import at_pixels
 from brrp_cli.geometry import normalise
+from brrp_cli.ground_truth.metrics import f_score_of_distances
 from brrp_cli.ground_truth.pieces import count_pieces
 from brrp_cli.ground_truth.thickness import thickness_class
 from brrp_cli.ground_truth.true_meshes import ExactMesh
@@ -201,7 +202,7 @@ def score_surface(
         "surface_distance": both(distances, *everywhere),
         "distance_to_truth": float(forth.distance.mean()),
         "distance_from_truth": float(back.distance.mean()),
-        **{name: _f_score(*distances, limit) for name, limit in F_SCORES.items()},
+        **{name: f_score_of_distances(*distances, limit) for name, limit in F_SCORES.items()},
         **_solidity(mesh, truth),
         "normal_consistency": both(cosines, *everywhere),
         "normal_consistency_seen": both(cosines, to_seen, truth.seen),
@@ -239,12 +240,6 @@ def _solidity(mesh: trimesh.Trimesh, truth: TrueSurface) -> dict[str, float]:
         "pieces": float(pieces),
         "one_piece": float(pieces <= truth.pieces),
     }
-
-
-def _f_score(forth: Points, back: Points, limit: float) -> float:
-    precision, recall = float(np.mean(forth <= limit)), float(np.mean(back <= limit))
-    total = precision + recall
-    return 2 * precision * recall / total if total > 0 else 0.0
 
 
 def _cosines(normals: Points, others: Points) -> Points:

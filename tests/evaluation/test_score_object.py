@@ -5,7 +5,7 @@ import pytest
 import trimesh
 
 from brrp_cli.evaluation.score_object import (
-    level_set,
+    isosurface,
     placement_error,
     reliability_sums,
     score_probabilities,
@@ -133,15 +133,15 @@ def test_behind_is_further_along_the_ray(frame):
     assert behind_seen(points, frame).tolist() == [False, True, False, False, False]
 
 
-def test_level_set_lies_where_the_grid_says():
+def test_an_isosurface_lies_where_the_grid_says():
     axis = np.linspace(-1, 1, 41)
     x, y, z = np.meshgrid(axis, axis, axis, indexing="ij")
     volume = 1 / (1 + np.exp(20 * (np.sqrt(x**2 + y**2 + z**2) - 0.5)))
-    mesh = level_set(volume, similarity(0.05, translation=np.array([4.0, 5.0, 6.0]) - 1))
+    mesh = isosurface(volume, similarity(0.05, translation=np.array([4.0, 5.0, 6.0]) - 1))
     assert np.linalg.norm(mesh.vertices - [4, 5, 6], axis=1) == pytest.approx(0.5, abs=0.01)
     assert mesh.volume == pytest.approx(4 / 3 * np.pi * 0.5**3, rel=0.02)
-    assert level_set(np.zeros((3, 3, 3)), np.eye(4)) is None
-    assert level_set(np.ones((3, 3, 3)), np.eye(4)) is None
+    assert isosurface(np.zeros((3, 3, 3)), np.eye(4)) is None
+    assert isosurface(np.ones((3, 3, 3)), np.eye(4)) is None
 
 
 def test_placement_error_is_the_distance_of_surfaces(truth):
