@@ -14,7 +14,7 @@ import click
 
 from brrp_cli.errors import BrrpError, unexpected
 from brrp_cli.memory import one_heap
-from brrp_cli.nearest import nearest
+from brrp_cli.similar_names import most_similar_name
 from brrp_cli.spoken import command_line
 from brrp_cli.stop import sigterm_raises, stopped
 from brrp_cli.version import __version__
@@ -122,7 +122,7 @@ class LazyGroup(click.Group):
         self, ctx: click.Context, args: list[str]
     ) -> tuple[str | None, click.Command | None, list[str]]:
         """The command that was typed; one that is not there is told with the one most like it."""
-        meant = None if args[0] in COMMANDS else nearest(args[0], COMMANDS)
+        meant = None if args[0] in COMMANDS else most_similar_name(args[0], COMMANDS)
         if meant is not None and self.get_command(ctx, args[0]) is None:
             ctx.fail(f"No such command {args[0]!r}. Did you mean {meant!r}?")
         return super().resolve_command(ctx, args)

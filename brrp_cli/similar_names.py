@@ -6,7 +6,12 @@ from collections.abc import Iterable
 from difflib import get_close_matches
 
 
-def nearest(name: str, names: Iterable[str]) -> str | None:
-    """The one of `names` that is most like `name`; None where none is like it."""
-    found = get_close_matches(name.lower(), {each.lower(): each for each in names}, n=1)
-    return next((each for each in names if found and each.lower() == found[0]), None)
+def most_similar_name(name: str, names: Iterable[str]) -> str | None:
+    """The one of `names` that is most like `name`, small or capital letters; None where none is
+    like it."""
+    # Of names that differ in case alone, the first.
+    by_lower: dict[str, str] = {}
+    for each in names:
+        by_lower.setdefault(each.lower(), each)
+    found = get_close_matches(name.lower(), by_lower, n=1)
+    return by_lower[found[0]] if found else None

@@ -11,7 +11,7 @@ from click.core import ParameterSource
 
 from brrp_cli.methods.base import Method
 from brrp_cli.methods.registry import METHODS
-from brrp_cli.nearest import nearest
+from brrp_cli.similar_names import most_similar_name
 
 CONFIG_HELP = "TOML with numbers that differ from the preset's; brrp config show prints them all."
 
@@ -32,7 +32,7 @@ class OneOf(click.ParamType):
         """The name as it was given."""
         names = list(self.names())
         if value not in names:
-            meant = nearest(str(value), names)
+            meant = most_similar_name(str(value), names)
             hint = f" Did you mean {meant!r}?" if meant else ""
             self.fail(f"{value!r} is not one of {', '.join(map(repr, names))}.{hint}", param, ctx)
         return str(value)

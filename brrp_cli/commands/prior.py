@@ -10,7 +10,6 @@ import click
 
 from brrp_cli.commands.build_prior import keep_descriptions, told_failures
 from brrp_cli.commands.json_option import json_option, report_of
-from brrp_cli.errors import PriorError
 from brrp_cli.prior.default import locate_prior
 from brrp_cli.prior.locate import output_prior
 from brrp_cli.progress import note, quiet
@@ -191,19 +190,13 @@ def show(name: str, prior: Path | None, out: Path | None, overwrite: bool) -> No
       brrp prior show 025_mug --prior prior/ -o mug.png
     """
     from brrp_cli.files import refuse_existing
-    from brrp_cli.nearest import nearest
+    from brrp_cli.prior.names import unknown_object
     from brrp_cli.prior.store import open_prior
 
     folder, _ = locate_prior(prior)
     opened = open_prior(folder)
     if name not in opened.index.rows:
-        meant = nearest(name, opened.names)
-        raise PriorError(
-            "The prior has no such object",
-            where=folder,
-            found=name,
-            fix=f"did you mean {meant}?" if meant else "brrp prior list shows the names",
-        )
+        raise unknown_object(name, opened.names, folder)
     if out is not None:
         refuse_existing(out, overwrite=overwrite)
     item = opened.load(name)

@@ -10,7 +10,7 @@ from typing import Any, TypeVar, Union, get_args, get_origin, get_type_hints
 
 from brrp_cli.config.ranges import LEAST, MOST
 from brrp_cli.errors import ConfigError
-from brrp_cli.nearest import nearest
+from brrp_cli.similar_names import most_similar_name
 
 T = TypeVar("T")
 
@@ -42,7 +42,7 @@ def changed(config: T, table: Mapping[str, Any], source: object, inside: str = "
 
 def unknown_key(source: object, key: str, inside: str, known: Mapping[str, Any]) -> ConfigError:
     """The message for a key that is not there, with the one that was meant."""
-    meant = nearest(key.removeprefix(inside), known)
+    meant = most_similar_name(key.removeprefix(inside), known)
     return ConfigError(
         "The configuration has no such key",
         where=f"{source}: {key}",

@@ -18,7 +18,7 @@ from typing import Any
 
 from brrp_cli.errors import GripperError
 from brrp_cli.grasping.gripper import Gripper
-from brrp_cli.nearest import nearest
+from brrp_cli.similar_names import most_similar_name
 
 FOLDER = files("brrp_cli.grasping") / "grippers"
 SUFFIXES = (".yaml", ".yml")
@@ -49,7 +49,7 @@ def open_gripper(name: str | Path) -> Gripper:
         return _read(Path(name))
     names = gripper_names()
     if str(name) not in names:
-        meant = nearest(str(name), names)
+        meant = most_similar_name(str(name), names)
         hint = f"did you mean {meant}? " if meant else ""
         raise GripperError(
             "No such gripper",

@@ -11,7 +11,6 @@ from pathlib import Path
 
 from brrp_cli.errors import MeshError, PriorError
 from brrp_cli.executors.processes import Processes
-from brrp_cli.nearest import nearest
 from brrp_cli.prior.appearance_file import kept_rows
 from brrp_cli.prior.build.build import (
     TIME_LIMIT,
@@ -24,6 +23,7 @@ from brrp_cli.prior.build.descriptions import describe, read_descriptions
 from brrp_cli.prior.build.find_meshes import find_all_meshes
 from brrp_cli.prior.build.reuse import Finished, Reusable, unlisted_objects
 from brrp_cli.prior.manifest import FILE, Manifest, ObjectEntry, read_bytes, read_manifest
+from brrp_cli.prior.names import unknown_object
 from brrp_cli.prior.parameters import differences, restore_parameters
 from brrp_cli.prior.shard import damaged
 from brrp_cli.threads import cores
@@ -73,7 +73,7 @@ def remove_objects(prior: Path, names: Iterable[str]) -> BuildReport:
         gone = set(names)
         known = {entry.name for entry in before.objects} | {f.name for f in before.failed}
         for name in sorted(gone - known):
-            raise _unknown(name, known, prior)
+            raise unknown_object(name, known, prior)
         kept = [entry for entry in before.objects if entry.name not in gone]
         if not kept:
             raise PriorError(
@@ -212,13 +212,3 @@ def _refuse_unlike(manifests: dict[Path, Manifest]) -> None:
                     found=f"{there.name} and {entry.name}",
                     fix="remove one of them first: brrp prior remove " + entry.name,
                 )
-
-
-def _unknown(name: str, known: Iterable[str], prior: Path) -> PriorError:
-    meant = nearest(name, known)
-    return PriorError(
-        "The prior has no such object",
-        where=prior,
-        found=name,
-        fix=f"did you mean {meant}?" if meant else "brrp prior list shows the names",
-    )
