@@ -22,6 +22,13 @@ def mask_box(mask: Mask, margin: int) -> tuple[slice, slice]:
     return by_row, by_column
 
 
+def widened(window: tuple[slice, slice], margin: int) -> tuple[slice, slice]:
+    """A window of an image with `margin` pixels more around it, as far as the image reaches."""
+    # What lies beyond its end NumPy leaves out by itself.
+    rows, columns = (slice(max(cut.start - margin, 0), cut.stop + margin) for cut in window)
+    return rows, columns
+
+
 def distance_to(mask: Mask) -> NDArray[np.float64]:
     """(h, w) pixels to the nearest pixel of a mask (h, w); infinite where it is empty."""
     from scipy.ndimage import distance_transform_edt

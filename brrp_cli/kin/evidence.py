@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import binary_dilation, distance_transform_edt, minimum_filter
 
 from brrp_cli.config import KinConfig, SensorConfig
-from brrp_cli.frames.dilate import dilated
+from brrp_cli.frames.dilate import dilated, mask_box
 from brrp_cli.frames.frame import Frame
 from brrp_cli.frames.last_frame import kept_for_last_frame
 from brrp_cli.frames.projection import at_pixels
@@ -133,12 +133,8 @@ def _free(
     """Points (m, 3), camera frame, of free space: in front of what was seen of the object, and
     beside it, at depths that it may have."""
     mask = frame.segmap == object_id
-    rows, columns = np.nonzero(mask)
     inner, outer = config.ring
-    window = tuple(
-        slice(max(0, int(each.min()) - outer - 1), int(each.max()) + outer + 2)
-        for each in (rows, columns)
-    )
+    window = mask_box(mask, outer + 1)
     own, depth = mask[window], frame.points[..., 2][window]
     beside = binary_dilation(own, iterations=outer) & ~binary_dilation(own, iterations=inner)
     size = float(np.linalg.norm(np.ptp(points, axis=0)))

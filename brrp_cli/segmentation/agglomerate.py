@@ -10,9 +10,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from brrp_cli.frames.dilate import mask_box
 from brrp_cli.segmentation.components import relabel
 from brrp_cli.segmentation.learned_affinities import Affinities
-from brrp_cli.segmentation.pixel_pairs import box_of, windows
+from brrp_cli.segmentation.pixel_pairs import windows
 
 
 def borders_of(affinities: Affinities) -> NDArray[np.float64]:
@@ -37,7 +38,7 @@ def join_alike_pixels(
     highest mean affinity, as long as it is over `least`."""
     count = int(parts.max()) + 1
     total, pairs = np.zeros((2, count * count))
-    window = box_of(parts > 0)
+    window = mask_box(parts > 0, 0)
     inside = parts[window]
     for same, offset in zip(affinities.same, affinities.offsets, strict=True):
         pixel, partner = windows(offset, inside.shape)

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from brrp_cli.config.segmentation import SegmentConfig
 from brrp_cli.errors import WeightsError
+from brrp_cli.frames.dilate import mask_box
 from brrp_cli.frames.frame import Frame
 from brrp_cli.frames.last_frame import kept_for_last_image
 from brrp_cli.learned_models import OnnxModel
@@ -26,7 +27,7 @@ from brrp_cli.segmentation.image_channels import (
     resized,
     size_of,
 )
-from brrp_cli.segmentation.pixel_pairs import OFFSETS, box_of
+from brrp_cli.segmentation.pixel_pairs import OFFSETS
 from brrp_cli.segmentation.rising import rising_in
 from brrp_cli.segmentation.seen_surfaces import SeenSurfaces
 from brrp_cli.threads import cores, in_threads
@@ -110,7 +111,7 @@ def affinities_of(
         beyond it; 0 elsewhere. None = of the whole image
     """
     size = size_of(rgb.shape[:2])
-    box = WHOLE if asked is None else box_of(resized(asked, size), margin)
+    box = WHOLE if asked is None else mask_box(resized(asked, size), margin)
     values = image_channels(rgb, seen, box).astype(np.float32) / np.float32(63)
     blind = values.copy()
     blind[COLOURS] = 0

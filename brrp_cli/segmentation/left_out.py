@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from brrp_cli.config.segmentation import LeftOutConfig
 from brrp_cli.dependencies import import_library
+from brrp_cli.frames.dilate import widened
 
 CUT = "cut by the image's border"
 IN_THE_AIR = "off the support surface"
@@ -43,11 +44,7 @@ def left_out(
         if border_share(segmap == object_id) > config.cut:
             reasons[object_id] = CUT
             continue
-        reach = config.reach
-        window = tuple(
-            slice(max(cut.start - reach, 0), min(cut.stop + reach, size))
-            for cut, size in zip(box, segmap.shape, strict=True)
-        )
+        window = widened(box, config.reach)
         mask = segmap[window] == object_id
         if not (mask & np.isfinite(height[window])).any():
             continue

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from brrp_cli.config.mending import RegroupConfig
 from brrp_cli.config.segmentation import SegmentConfig
 from brrp_cli.dependencies import import_library
+from brrp_cli.frames.dilate import mask_box
 from brrp_cli.frames.frame import BACKGROUND, Frame
 from brrp_cli.seeds import child_rng
 from brrp_cli.segmentation.cut import boundary_of, cut_at_strongest, filled
@@ -138,9 +139,11 @@ def _near(frame: Frame, ids: Sequence[int], reach: int, gap: float) -> list[froz
     solid = np.where(np.isin(frame.segmap, list(ids)) & frame.valid, frame.segmap, BACKGROUND)
     depth = frame.points[..., 2]
     pairs = []
-    for i, rows, columns in _boxes(solid, ids, reach):
-        window = (rows, columns)
+    for i in sorted(ids):
+        window = mask_box(solid == i, reach)
         others, here = solid[window], solid[window] == i
+        if not here.any():
+            continue
         far, nearest = ndimage.distance_transform_edt(~here, return_indices=True)
         beside = (others > i) & (far <= reach)
         apart = np.abs(depth[window][tuple(nearest)] - depth[window])
@@ -150,20 +153,6 @@ def _near(frame: Frame, ids: Sequence[int], reach: int, gap: float) -> list[froz
             if np.median(apart[beside & (others == j)]) < gap
         ]
     return pairs
-
-
-def _boxes(
-    segmap: NDArray[np.integer], ids: Sequence[int], margin: int
-) -> list[tuple[int, slice, slice]]:
-    """The window around each mask that has a pixel, and `margin` pixels more."""
-    found = []
-    for i in sorted(ids):
-        rows, columns = np.nonzero(segmap == i)
-        if len(rows):
-            low = [max(int(at.min()) - margin, 0) for at in (rows, columns)]
-            high = [int(at.max()) + margin + 1 for at in (rows, columns)]
-            found.append((i, slice(low[0], high[0]), slice(low[1], high[1])))
-    return found
 
 
 def parts(
@@ -176,8 +165,7 @@ def parts(
     """What may be an object of its own in one mask: halves on both sides of its strongest boundary
     (H, W), and what hangs together in colour. Parts that are nearly alike come once."""
     own = config.regroup
-    ((_, rows, columns),) = _boxes(frame.segmap, [object_id], 1)
-    window = (rows, columns)
+    window = mask_box(frame.segmap == object_id, 1)
     mask, seen = frame.segmap[window] == object_id, frame.valid[window]
     cut = cut_at_strongest(mask & seen, boundary[window], 2, config)
     pieces = [] if cut is None else _pieces(filled(mask, cut), mask)

@@ -1,13 +1,10 @@
-"""Pixels of an image, their partners at an offset, and the box around some of them.
+"""Pixels of an image, and their partners at an offset.
 
 Near partners tell borders, far ones what belongs together beyond a border that prints, shadows or
 waves of depth have drawn (Wolf et al., "The Mutex Watershed", ECCV 2018).
 """
 
 from __future__ import annotations
-
-import numpy as np
-from numpy.typing import NDArray
 
 # Rows and columns from a pixel to its partner, in pixels of the network's image.
 REACHES = (2, 6, 14, 32)
@@ -27,16 +24,3 @@ def windows(
         for step, size in zip(offset, shape, strict=True)
     )
     return (rows, columns), (other_rows, other_columns)
-
-
-def box_of(mask: NDArray[np.bool_], margin: int = 0) -> tuple[slice, slice]:
-    """Rows and columns that hold all pixels of a mask (h, w), and so many more on all sides; none
-    of an empty one."""
-    rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
-    if not len(rows):
-        return np.s_[:0], np.s_[:0]
-    (top, left), (low, right) = (
-        np.maximum(np.array([rows[0], columns[0]]) - margin, 0),
-        np.array([rows[-1], columns[-1]]) + margin + 1,
-    )
-    return np.s_[top:low], np.s_[left:right]

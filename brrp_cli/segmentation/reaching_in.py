@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from brrp_cli.config.segmentation import ReachingInConfig, SegmentConfig
 from brrp_cli.dependencies import import_library
 from brrp_cli.errors import FrameError
+from brrp_cli.frames.dilate import widened
 from brrp_cli.frames.frame import Frame
 from brrp_cli.segmentation.beneath import hidden_by_itself
 from brrp_cli.segmentation.left_out import stands
@@ -103,19 +104,13 @@ def _is_part(
     distance, _ = tree.query(seen.points[window][mine], distance_upper_bound=own.near)
     if not np.isfinite(distance).any():
         return False
-    wider = _wider(window, config.left_out.reach)
+    wider = widened(window, config.left_out.reach)
     around = (labels[wider], seen.depth[wider], seen.height[wider])
     mine = labels[wider] == label
     nowhere = np.zeros(mine.shape, dtype=bool)
     if stands(mine, *around, nowhere, own.clear, config.left_out):
         return False
     return hidden_by_itself(labels == label, frame, seen.table.plane, config.left_out) < own.hides
-
-
-def _wider(window: tuple[slice, slice], margin: int) -> tuple[slice, slice]:
-    """A window of an image with some pixels more around it."""
-    rows, columns = (slice(max(cut.start - margin, 0), cut.stop + margin) for cut in window)
-    return rows, columns
 
 
 def arms_in(frame: Frame, seed: int, config: SegmentConfig) -> Mask:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from brrp_cli.config.segmentation import BordersConfig
 from brrp_cli.dependencies import import_library
+from brrp_cli.frames.dilate import widened
 
 Mask = NDArray[np.bool_]
 
@@ -32,10 +33,7 @@ def refine_borders(
     for object_id, box in enumerate(ndimage.find_objects(segmap), start=1):
         if box is None:
             continue
-        window = tuple(
-            slice(max(cut.start - config.ring, 0), min(cut.stop + config.ring, size))
-            for cut, size in zip(box, segmap.shape, strict=True)
-        )
+        window = widened(box, config.ring)
         mask, free = segmap[window] == object_id, empty[window]
         # Pixels of other objects are neither: borders with them stay.
         inner = ndimage.distance_transform_edt(~free)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.ndimage import binary_dilation, binary_opening
 
-from brrp_cli.frames.dilate import dilated, mask_box, opened
+from brrp_cli.frames.dilate import dilated, mask_box, opened, widened
 
 
 @pytest.mark.parametrize("pixels", [0, 1, 4, 40])
@@ -43,3 +43,9 @@ def test_a_box_holds_the_mask_and_what_is_around_it():
     mask[4, 5] = mask[6, 12] = True
     assert mask_box(mask, 0) == (slice(4, 7), slice(5, 13))
     assert mask[mask_box(mask, 5)].shape == (10, 15)
+
+
+def test_a_window_is_widened_as_far_as_the_image_reaches():
+    image = np.zeros((20, 30))
+    assert image[widened(np.s_[5:8, 1:4], 2)].shape == (7, 6)  # not beyond the left edge
+    assert image[widened(np.s_[15:19, 10:30], 3)].shape == (8, 23)

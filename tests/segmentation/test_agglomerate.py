@@ -5,7 +5,7 @@ import pytest
 
 from brrp_cli.segmentation.agglomerate import borders_of, join_alike_pixels
 from brrp_cli.segmentation.learned_affinities import Affinities
-from brrp_cli.segmentation.pixel_pairs import OFFSETS, box_of, windows
+from brrp_cli.segmentation.pixel_pairs import OFFSETS, windows
 
 SHAPE = (40, 60)
 
@@ -39,14 +39,6 @@ def test_no_pixel_of_a_small_image_has_a_partner_beyond_it():
     for offset in ((32, 0), (32, -32), (-32, 32)):
         assert small[windows(offset, small.shape)[0]].size == 0
         assert small[windows(offset, small.shape)[1]].size == 0
-
-
-def test_the_box_holds_the_mask_and_no_more():
-    mask = np.zeros(SHAPE, bool)
-    assert mask[box_of(mask)].size == 0
-    mask[5, 7] = mask[9, 3] = True
-    assert box_of(mask) == np.s_[5:10, 3:8]
-    assert mask[box_of(mask, 4)].shape == (13, 12)  # not beyond the left edge
 
 
 def test_a_border_lies_between_the_pixels_that_differ():
