@@ -193,29 +193,14 @@ def _scaled(
         raise FrameError(
             "The depth scale is no positive number", where=source, found=scale, expected="> 0"
         )
-    valid = np.isfinite(raw_z) & (raw_z != 0)
-    if (raw_z[valid] < 0).any():
-        raise FrameError(
-            f"{name} holds negative depth",
-            where=source,
-            expected="depth along z, forward; 0 or NaN where there is no return",
-            found=f"{int((raw_z[valid] < 0).sum())} negative values, smallest {raw_z[valid].min()}",
-            fix="turn OpenGL's z (backward) round; set pixels without a return to 0",
-        )
-    if not valid.any():
-        raise FrameError(
-            f"{name} has no valid pixel",
-            where=source,
-            expected="some depth above 0",
-            found="NaN or inf everywhere" if not np.isfinite(raw_z).any() else "0, NaN or inf only",
-            fix="check that the depth image is the right file and that the sensor ran",
-        )
-    integers = raw.dtype.kind in "iu"
-    factor = scale if scale is not None else (0.001 if integers else 1.0)
-    median = float(np.median(raw_z[valid])) * factor
-    unit = "as millimetres" if integers else "as metres"
+    valid = _measured(raw_z, name, source)
     if scale is not None:
-        unit = "x depth scale"
+        factor, unit = scale, "x depth scale"
+    elif raw.dtype.kind in "iu":
+        factor, unit = 0.001, "as millimetres"
+    else:
+        factor, unit = 1.0, "as metres"
+    median = float(np.median(raw_z[valid])) * factor
     if not NEAREST_MEDIAN <= median <= FARTHEST_MEDIAN:
         raise FrameError(
             f"{name} seems to be in another unit",
@@ -232,9 +217,7 @@ def _scaled(
             source or "The frame",
             median,
             raw.dtype,
-            "x depth scale"
-            if scale is not None
-            else ("as millimetres" if integers else "as metres"),
+            unit,
             option("depth_scale"),
         )
     with np.errstate(over="ignore", invalid="ignore"):
@@ -249,6 +232,28 @@ def _scaled(
         )
     metres[beyond] = np.nan
     return metres
+
+
+def _measured(raw_z: NDArray[Any], name: str, source: Path | None) -> NDArray[np.bool_]:
+    """(H, W) where there is a return. Errors: FrameError for negative depth, and for none."""
+    valid: NDArray[np.bool_] = np.isfinite(raw_z) & (raw_z != 0)
+    if (raw_z[valid] < 0).any():
+        raise FrameError(
+            f"{name} holds negative depth",
+            where=source,
+            expected="depth along z, forward; 0 or NaN where there is no return",
+            found=f"{int((raw_z[valid] < 0).sum())} negative values, smallest {raw_z[valid].min()}",
+            fix="turn OpenGL's z (backward) round; set pixels without a return to 0",
+        )
+    if not valid.any():
+        raise FrameError(
+            f"{name} has no valid pixel",
+            where=source,
+            expected="some depth above 0",
+            found="NaN or inf everywhere" if not np.isfinite(raw_z).any() else "0, NaN or inf only",
+            fix="check that the depth image is the right file and that the sensor ran",
+        )
+    return valid
 
 
 def _colour(rgb: ArrayLike, source: Path | None) -> NDArray[np.uint8]:

@@ -62,7 +62,10 @@ def messages(scene, store, ros1):
         yield "/camera/depth/image_rect_raw", kind, late, image(late, raw, "16UC1")
 
 
-def write(scene, path: Path, ros1: bool, leave_out: str = "nothing") -> Path:
+def write(
+    scene, path: Path, ros1: bool, leave_out: str = "nothing", silent: str = "nothing"
+) -> Path:
+    """A bag without topics of the name `leave_out`, and without messages of those of `silent`."""
     store = get_typestore(Stores.ROS1_NOETIC if ros1 else Stores.ROS2_HUMBLE)
     serialize = store.serialize_ros1 if ros1 else store.serialize_cdr
     with Writer1(path) if ros1 else Writer2(path, version=9) as writer:
@@ -72,7 +75,8 @@ def write(scene, path: Path, ros1: bool, leave_out: str = "nothing") -> Path:
                 continue
             if topic not in connections:
                 connections[topic] = writer.add_connection(topic, kind, typestore=store)
-            writer.write(connections[topic], time, serialize(message, kind))
+            if silent not in topic:
+                writer.write(connections[topic], time, serialize(message, kind))
     return path
 
 
@@ -145,3 +149,10 @@ def test_a_bag_says_what_it_holds(bag):
     assert "2 frames" in result.output
     assert "/camera/color/image_raw: 2 Image" in result.output
     assert "/camera/color/camera_info: 1 CameraInfo" in result.output
+
+
+def test_topics_without_messages_are_told(scene, tmp_path):
+    path = write(scene, tmp_path / "no_info", ros1=False, silent="camera_info")
+    with pytest.raises(FrameError, match="no camera_info") as told:
+        read_frame(path)
+    assert "/camera/color/camera_info" in str(told.value)

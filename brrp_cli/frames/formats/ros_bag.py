@@ -49,12 +49,20 @@ def read(path: Path, request: Request) -> Frame:
         choice = _choose(reader, request, path)
         log.info("Topics: %s, %s, %s", choice.color, choice.depth, choice.info)
         info = next((message for _, message in _messages(reader, choice.info)), None)
+        if info is None:
+            raise FrameError(
+                "The bag has no camera_info",
+                where=path,
+                expected=f"a message of {choice.info}",
+                found="the topic, without one",
+                fix="record it too",
+            )
         times = _times(reader, choice.color)
-        if info is None or index >= len(times):
+        if index >= len(times):
             raise FrameError(
                 "The bag has no such frame",
                 where=path,
-                expected=f"0 to {len(times) - 1}",
+                expected=f"0 to {len(times) - 1}" if times else "a colour image",
                 found=f"--index {index}",
             )
         time = times[index]
