@@ -69,6 +69,11 @@ def turns_about(rotations: NDArray[np.float64], middle: NDArray[np.float64]) -> 
     return T
 
 
+def rotation_angle(rotation: Array) -> float:
+    """Radians by which a rotation (3, 3) turns, 0 to pi."""
+    return float(np.arccos(np.clip((np.trace(rotation) - 1) / 2, -1, 1)))
+
+
 def cells_of(points: NDArray[np.floating], cell: float) -> NDArray[np.int64]:
     """(n,) number, from 0 on and without gaps, of the grid cell of `cell` that each of points
     (n, d) lies in; in the order of the cells, the last coordinate fastest."""

@@ -8,6 +8,7 @@ from brrp_cli.geometry import (
     cells_of,
     normalise,
     project,
+    rotation_angle,
     similarity,
     transform_points,
     within,
@@ -96,3 +97,10 @@ def test_points_of_one_cell_have_one_number(cell: float) -> None:
     cells = [tuple(each) for each in np.floor(points / cell).astype(int).tolist()]
     numbers = {each: number for number, each in enumerate(sorted(set(cells)))}
     assert cells_of(points, cell).tolist() == [numbers[each] for each in cells]
+
+
+@pytest.mark.parametrize("degrees", [0.0, 1e-3, 30.0, 90.0, 180.0])
+def test_a_rotation_turns_by_its_angle(degrees):
+    axis = np.array([1.0, -2.0, 0.5])
+    turn = Rotation.from_rotvec(np.radians(degrees) * axis / np.linalg.norm(axis)).as_matrix()
+    assert np.degrees(rotation_angle(turn)) == pytest.approx(degrees, abs=1e-5)

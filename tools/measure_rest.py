@@ -26,6 +26,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from one_message import one_message
 
+from brrp_cli.geometry import rotation_angle
 from brrp_cli.planning.numbers import quaternion_wxyz
 
 SECONDS = 3.0
@@ -189,9 +190,8 @@ def _place(data: Any, name: str) -> tuple[np.ndarray, np.ndarray]:
 def _between(
     first: tuple[np.ndarray, np.ndarray], last: tuple[np.ndarray, np.ndarray]
 ) -> tuple[float, float]:
-    cosine = (np.trace(first[1].T @ last[1]) - 1) / 2
-    turned = float(np.degrees(np.arccos(np.clip(cosine, -1, 1))))
-    return 1000 * float(np.linalg.norm(last[0] - first[0])), turned
+    turned = rotation_angle(first[1].T @ last[1])
+    return 1000 * float(np.linalg.norm(last[0] - first[0])), float(np.degrees(turned))
 
 
 def _three(values: list[float]) -> str:

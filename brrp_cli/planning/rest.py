@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 from brrp_cli.config.planning import RestConfig
 from brrp_cli.dependencies import import_library
 from brrp_cli.errors import DependencyError, ResultError
-from brrp_cli.geometry import transform_points
+from brrp_cli.geometry import rotation_angle, transform_points
 from brrp_cli.planning.body import Body, lift_onto
 from brrp_cli.planning.mjcf import Files, Table, scene_mjcf
 from brrp_cli.planning.parts import hull_corners
@@ -247,9 +247,8 @@ def _lifted(bodies: Mapping[str, Body], table: Table) -> Poses:
 
 def _between(first: Array, last: Array) -> tuple[float, float]:
     """Metres and degrees from one pose (4, 4) to another."""
-    cosine = (np.trace(first[:3, :3].T @ last[:3, :3]) - 1) / 2
-    turned = float(np.degrees(np.arccos(np.clip(cosine, -1, 1))))
-    return float(np.linalg.norm(last[:3, 3] - first[:3, 3])), turned
+    turned = rotation_angle(first[:3, :3].T @ last[:3, :3])
+    return float(np.linalg.norm(last[:3, 3] - first[:3, 3])), float(np.degrees(turned))
 
 
 def _within(first: Array, last: Array, metres: float, degrees: float) -> bool:

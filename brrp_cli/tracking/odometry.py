@@ -15,7 +15,7 @@ from brrp_cli.dependencies import import_open3d, one_openmp_thread
 from brrp_cli.frames.dilate import dilated
 from brrp_cli.frames.frame import BACKGROUND, Frame, StreamPose
 from brrp_cli.frames.projection import depth_behind, pixel_numbers
-from brrp_cli.geometry import inverse, transform_points
+from brrp_cli.geometry import inverse, rotation_angle, transform_points
 from brrp_cli.tracking.motion import background_stands, noisier
 
 Array = NDArray[np.float64]
@@ -142,8 +142,7 @@ def _far(key: Frame, last: Frame, config: OdometryConfig) -> bool:
     if key.stream_pose.stream != last.stream_pose.stream:
         return True
     T = _between(key, last)
-    cosine = np.clip((np.trace(T[:3, :3]) - 1) / 2, -1, 1)
-    return bool(np.arccos(cosine) > config.turn or np.linalg.norm(T[:3, 3]) > config.shift)
+    return bool(rotation_angle(T[:3, :3]) > config.turn or np.linalg.norm(T[:3, 3]) > config.shift)
 
 
 def _wrong(then: Frame, now: Frame, T_now_then: Array, config: TrackConfig) -> float:
