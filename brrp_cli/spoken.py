@@ -1,10 +1,13 @@
-"""How a message names an option, as the user typed it or would have, and how it counts."""
+"""How a message names an option, as the user typed it or would have, how it counts, and what it
+calls an object that is none of the prior's."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
+
+NOT_STORED = "none of them"
 
 _TYPED: ContextVar[bool] = ContextVar("typed", default=False)
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from brrp_cli.commands.exit_codes import SOME_FAILED
 from brrp_cli.commands.scheduler_option import scheduler_option
 from brrp_cli.commands.seed_option import SEED, SEED_HELP
 from brrp_cli.errors import BrrpError
@@ -101,7 +102,7 @@ def command(
     )
     keep_descriptions(report.path, clip_dir)
     if manifest.failed:
-        sys.exit(3)
+        sys.exit(SOME_FAILED)
 
 
 def told_failures(manifest: Manifest) -> None:

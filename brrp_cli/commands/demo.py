@@ -10,13 +10,14 @@ from typing import TYPE_CHECKING
 
 import click
 
+from brrp_cli.commands.exit_codes import SOME_FAILED
 from brrp_cli.commands.json_option import json_option, report_of
 from brrp_cli.commands.method_options import OneOf
 from brrp_cli.commands.object_table import told
 from brrp_cli.commands.seed_option import SEED, device_option
 from brrp_cli.methods.registry import DEFAULT, METHODS
 from brrp_cli.progress import note
-from brrp_cli.spoken import counted
+from brrp_cli.spoken import NOT_STORED, counted
 
 if TYPE_CHECKING:
     import trimesh
@@ -25,9 +26,7 @@ if TYPE_CHECKING:
     from brrp_cli.demo.score import Score
     from brrp_cli.reconstruction import ObjectReconstruction, Reconstruction
 
-SOME_FAILED = 3
 FRAME = "frame.npz"
-NOT_STORED = "none of them"
 
 
 @click.command("demo")

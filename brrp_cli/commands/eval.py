@@ -9,6 +9,7 @@ from typing import Any
 
 import click
 
+from brrp_cli.commands.exit_codes import SOME_FAILED
 from brrp_cli.commands.json_option import json_option, report_of
 from brrp_cli.commands.method_options import (
     CONFIG_HELP,
@@ -27,7 +28,6 @@ from brrp_cli.retrieval.choose import RETRIEVERS
 from brrp_cli.retrieval.clip.model_files import CLIP_DIR_VARIABLE
 from brrp_cli.spoken import counted
 
-SOME_FAILED = 3
 ABLATIONS = ("truth",)
 
 

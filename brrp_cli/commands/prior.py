@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from brrp_cli.commands.build_prior import keep_descriptions, told_failures
+from brrp_cli.commands.exit_codes import SOME_FAILED
 from brrp_cli.commands.json_option import json_option, report_of
 from brrp_cli.prior.default import locate_prior
 from brrp_cli.prior.locate import output_prior
@@ -102,7 +103,7 @@ def add(
     click.echo(f"{counted(len(report.made), 'object')} made; {_total(report)}")
     keep_descriptions(report.path, clip_dir)
     if report.manifest.failed:
-        sys.exit(3)
+        sys.exit(SOME_FAILED)
 
 
 @command.command("remove")

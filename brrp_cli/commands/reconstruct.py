@@ -11,6 +11,7 @@ import click
 
 from brrp_cli.commands.beside import POSES, Beside
 from brrp_cli.commands.do_frame import in_a_stream, on_its_own
+from brrp_cli.commands.exit_codes import SOME_FAILED
 from brrp_cli.commands.export import CONFIDENCE, check_libraries
 from brrp_cli.commands.grasp import GRIPPER_HELP
 from brrp_cli.commands.json_option import json_option, report_of
@@ -47,7 +48,6 @@ if TYPE_CHECKING:
     from brrp_cli.prior.store import Prior
     from brrp_cli.retrieval.base import Retriever
 
-SOME_FAILED = 3
 NO_COLLISION = "none"
 
 

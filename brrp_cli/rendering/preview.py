@@ -9,10 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brrp_cli.frames.frame import Frame
+from brrp_cli.geometry import IMAGE_UP
 from brrp_cli.reconstruction import ObjectReconstruction
 from brrp_cli.rendering.framing import near_others, shown_whole
 from brrp_cli.rendering.render import View, fitted, render, view_from_behind
 from brrp_cli.segmentation.mask_picture import draw_masks, object_colours
+from brrp_cli.spoken import NOT_STORED
 from brrp_cli.surface.colours import (
     scale_top,
     spread,
@@ -29,8 +31,6 @@ CAPTION = 28
 SMALLEST = 8  # type of the list
 INDENT = 26  # pixels, of the list's text
 INK = (30, 30, 30)
-IMAGE_UP = np.array([0.0, -1.0, 0.0])
-NOT_STORED = "none of them"
 LEAST = 0.005  # of weights and probabilities: less reads as 0.00
 
 
