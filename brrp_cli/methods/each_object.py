@@ -22,6 +22,11 @@ def with_surface(
     return guarded(object_id, lambda: checked(infer(), surface))
 
 
+def surfaced(item: ObjectReconstruction, surface: SurfaceConfig) -> ObjectReconstruction:
+    """An object that was inferred, with its surface, `guarded`."""
+    return with_surface(item.object_id, lambda: item, surface)
+
+
 def guarded(
     object_id: int, make: Callable[[], ObjectReconstruction], level: int = logging.WARNING
 ) -> ObjectReconstruction:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import asdict, dataclass
-from functools import lru_cache, partial
+from functools import lru_cache
 from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, ClassVar
@@ -25,7 +25,7 @@ from brrp_cli.inference.posterior import LOGISTIC_DEVIATION
 from brrp_cli.methods.base import Setup
 from brrp_cli.methods.coarse_to_fine import coarse_to_fine_volume
 from brrp_cli.methods.configuration import as_record
-from brrp_cli.methods.each_object import with_surface
+from brrp_cli.methods.each_object import surfaced, too_few
 from brrp_cli.methods.pointsdf.decoder_file import read_decoder, write_decoder
 from brrp_cli.methods.pointsdf.farthest_points import farthest_points
 from brrp_cli.methods.pointsdf.weights import OWN_WEIGHTS, Weights, load_weights
@@ -37,7 +37,6 @@ from brrp_cli.progress import progress
 from brrp_cli.reconstruction import (
     METRES,
     OK,
-    TOO_FEW_POINTS,
     Axes,
     ObjectReconstruction,
     Reconstruction,
@@ -165,10 +164,7 @@ def run(frame: Frame, setup: Setup) -> Reconstruction:
     found = reconstruct_pointsdf(cleaned, loaded.network, config)
     return Reconstruction(
         frame=frame,
-        objects=[
-            with_surface(item.object_id, partial(_itself, item), config.surface)
-            for item in progress(found, "surfaces")
-        ],
+        objects=[surfaced(item, config.surface) for item in progress(found, "surfaces")],
         plane=_plane(frame, config, setup.seed),
         method=NAME,
         retriever=None,
@@ -205,10 +201,6 @@ def _loaded(weights: Path, digest: str, device: str) -> Weights:
     return found
 
 
-def _itself(item: ObjectReconstruction) -> ObjectReconstruction:
-    return item
-
-
 def reconstruct_pointsdf(
     frame: Frame, network: PointSDF, config: PointSDFConfig
 ) -> list[ObjectReconstruction]:
@@ -222,12 +214,11 @@ def reconstruct_pointsdf(
     found, clouds = [], []
     for object_id in frame.object_ids:
         points = frame.object_points(object_id)
+        if len(points) < config.min_points:
+            found.append(too_few(object_id, len(points), config.min_points))
+            continue
         item = ObjectReconstruction(object_id, OK, n_points=len(points))
         found.append(item)
-        if len(points) < config.min_points:
-            item.status = TOO_FEW_POINTS
-            item.message = f"{len(points)} points with depth, {config.min_points} are needed"
-            continue
         item.observed, item.center = points, box_center(points)
         clouds.append(farthest_points(points - item.center, network.config.points))
     seen = [item for item in found if item.observed is not None]

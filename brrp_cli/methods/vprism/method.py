@@ -7,7 +7,6 @@ Scenes", 2024 (arXiv 2403.08106); the baseline of the paper's experiments.
 from __future__ import annotations
 
 from dataclasses import astuple, dataclass, field
-from functools import partial
 from time import perf_counter
 from typing import TYPE_CHECKING, ClassVar
 
@@ -19,7 +18,7 @@ from brrp_cli.frames.frame import Frame
 from brrp_cli.methods.base import Setup
 from brrp_cli.methods.coarse_to_fine import coarse_to_fine_volume
 from brrp_cli.methods.configuration import as_record
-from brrp_cli.methods.each_object import with_surface
+from brrp_cli.methods.each_object import surfaced, too_few
 from brrp_cli.methods.vprism.expected_softmax import expected_softmax
 from brrp_cli.methods.vprism.hinge_points import scene_hinges
 from brrp_cli.methods.vprism.kernel_features import KernelBasis
@@ -30,7 +29,6 @@ from brrp_cli.progress import progress
 from brrp_cli.reconstruction import (
     LOGIT_VARIANCE,
     OK,
-    TOO_FEW_POINTS,
     Axes,
     ObjectReconstruction,
     Reconstruction,
@@ -118,10 +116,7 @@ def run(frame: Frame, setup: Setup) -> Reconstruction:
     found = reconstruct_scene(scene, config, setup.seed)
     return Reconstruction(
         frame=frame,
-        objects=[
-            with_surface(item.object_id, partial(_itself, item), config.surface)
-            for item in progress(found, "surfaces")
-        ],
+        objects=[surfaced(item, config.surface) for item in progress(found, "surfaces")],
         plane=scene.plane,
         method=NAME,
         retriever=None,
@@ -134,10 +129,6 @@ def run(frame: Frame, setup: Setup) -> Reconstruction:
     )
 
 
-def _itself(item: ObjectReconstruction) -> ObjectReconstruction:
-    return item
-
-
 def reconstruct_scene(
     scene: SceneSamples, config: VPrismConfig, seed: int
 ) -> list[ObjectReconstruction]:
@@ -146,7 +137,7 @@ def reconstruct_scene(
     Objects with too few points for a class come back with that status.
     """
     start = perf_counter()
-    found = [_too_few(i, n, config.observation.min_points) for i, n in scene.too_few.items()]
+    found = [too_few(i, n, config.observation.min_points) for i, n in scene.too_few.items()]
     if scene.points:
         fitted = fit_scene(scene, config, seed)
         seconds = {"inference": (perf_counter() - start) / len(scene.points)}
@@ -194,12 +185,3 @@ def fit_scene(scene: SceneSamples, config: VPrismConfig, seed: int) -> SoftmaxMa
 
 def _box(center: NDArray[np.float64], half_width: float) -> NDArray[np.float64]:
     return np.stack([center - half_width, center + half_width])
-
-
-def _too_few(object_id: int, n: int, needed: int) -> ObjectReconstruction:
-    return ObjectReconstruction(
-        object_id=object_id,
-        status=TOO_FEW_POINTS,
-        message=f"{n} points with depth, at least {needed} are needed",
-        n_points=n,
-    )

@@ -135,7 +135,7 @@ def test_objects_with_too_few_points_say_so(trained):
     few = replace(frame, segmap=segmap)
     (item,) = reconstruct_pointsdf(few, network, PointSDFConfig())
     assert item.status == "too_few_points" and item.posterior is None
-    assert "5 points" in item.message
+    assert "5 valid depth points" in item.message
     nothing = Frame(frame.rgb, frame.points, np.zeros_like(segmap), frame.K)
     assert reconstruct_pointsdf(nothing, network, PointSDFConfig()) == []
 
