@@ -22,6 +22,17 @@ DRAWN = 5
 # A hand is drawn as bars this thick, metres: what is behind it still shows.
 THICK = 0.004
 COLOURS = "RdYlGn"
+# What reading JSON of another making ends in.
+_DAMAGE = (
+    OSError,
+    ValueError,
+    KeyError,
+    TypeError,
+    AttributeError,
+    IndexError,
+    OverflowError,
+    StopIteration,
+)
 
 
 def hands_by_object(record: Mapping[str, Any]) -> dict[int, trimesh.Trimesh]:
@@ -51,7 +62,7 @@ def stored_hands(folder: Path) -> dict[int, trimesh.Trimesh]:
         if record["schema"] != SCHEMA:
             return {}
         return hands_by_object(record)
-    except (OSError, ValueError, KeyError, TypeError, IndexError, StopIteration):
+    except _DAMAGE:
         return {}
 
 

@@ -41,7 +41,7 @@ def stored_grasps(folder: Path) -> dict[str, list[dict[str, Any]]]:
             ]
             for item in record["objects"]
         }
-    except (OSError, ValueError, KeyError, TypeError) as error:
+    except (OSError, ValueError, KeyError, TypeError, OverflowError) as error:
         raise ResultError(
             "The grasps cannot be read",
             where=path,
