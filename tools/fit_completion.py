@@ -50,17 +50,17 @@ from brrp_cli.completion.completed_mean import empty_space
 from brrp_cli.completion.network import Network
 from brrp_cli.completion.point_features import COUNT, WHOLE, point_features
 from brrp_cli.completion.visible_part import VisiblePart, visible_part
-from brrp_cli.config import HypothesesConfig, preset
+from brrp_cli.config import HypothesesConfig, ObservationConfig, preset
 from brrp_cli.dependencies import import_open3d
 from brrp_cli.errors import MeshError
 from brrp_cli.evaluation.perturb import shift_masks, with_noise
 from brrp_cli.files import write_bytes
-from brrp_cli.frames.frame import BACKGROUND
+from brrp_cli.frames.frame import BACKGROUND, Frame
 from brrp_cli.geometry import normalise, transform_points
 from brrp_cli.ground_truth.scenes import Scene, find_scenes
 from brrp_cli.ground_truth.truth import TrueObject, true_mesh
 from brrp_cli.observation.ray_samples import box_center
-from brrp_cli.observation.support_plane import fit_plane
+from brrp_cli.observation.support_plane import Plane, fit_plane
 from brrp_cli.prior.build.repair import repair
 from brrp_cli.raycast import raycasting_scene
 from brrp_cli.seeds import child_rng
@@ -115,6 +115,20 @@ def is_inside(points: NDArray[np.floating], solid: Any) -> NDArray[np.bool_]:
     return np.asarray(solid.compute_occupancy(query, nsamples=3).numpy() > 0.5)
 
 
+def clouds_and_plane(
+    frame: Frame, config: ObservationConfig, seed: int
+) -> tuple[dict[int, NDArray[np.float32]], Plane | None]:
+    """Points (n, 3), metres, camera frame, of each object with `MIN_PIXELS` of them, by id, and
+    the plane beneath these."""
+    clouds = {i: frame.object_points(i) for i in frame.object_ids}
+    clouds = {i: points for i, points in clouds.items() if len(points) >= MIN_PIXELS}
+    if not clouds:
+        return {}, None
+    middle = np.mean([box_center(points) for points in clouds.values()], axis=0)
+    ground = frame.points[frame.valid & (frame.segmap == BACKGROUND)]
+    return clouds, fit_plane(ground, config, seed, middle)
+
+
 def look(scene: Scene, data_root: Path, only: tuple[str, ...], views: int, seed: int) -> Examples:
     """The examples of a scene's first views."""
     config = preset("default")
@@ -129,13 +143,7 @@ def look(scene: Scene, data_root: Path, only: tuple[str, ...], views: int, seed:
             frame = shift_masks(frame, int(rng.choice([-2, -1, 1, 2])))
         T_world_cam = frame.T_world_cam
         assert T_world_cam is not None
-        clouds = {i: frame.object_points(i) for i in frame.object_ids}
-        clouds = {i: points for i, points in clouds.items() if len(points) >= MIN_PIXELS}
-        if not clouds:
-            continue
-        middle = np.mean([box_center(points) for points in clouds.values()], axis=0)
-        ground = frame.points[frame.valid & (frame.segmap == BACKGROUND)]
-        plane = fit_plane(ground, config.observation, seed, middle)
+        clouds, plane = clouds_and_plane(frame, config.observation, seed)
         for object_id, cloud in clouds.items():
             true = scene.object(object_id)
             solid = solid_of(true.mesh_path, data_root)

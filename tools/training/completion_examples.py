@@ -17,7 +17,7 @@ from io import BytesIO
 from pathlib import Path
 
 import numpy as np
-from fit_completion import MIN_PIXELS, asked_points, is_inside, solid_of
+from fit_completion import asked_points, clouds_and_plane, is_inside, solid_of
 from numpy.typing import NDArray
 from scipy.ndimage import binary_dilation
 
@@ -34,8 +34,6 @@ from brrp_cli.files import write_bytes
 from brrp_cli.frames.frame import BACKGROUND, Frame
 from brrp_cli.geometry import backproject, normalise, transform_points
 from brrp_cli.ground_truth.scenes import Scene
-from brrp_cli.observation.ray_samples import box_center
-from brrp_cli.observation.support_plane import fit_plane
 from brrp_cli.seeds import child_rng
 
 # What the frame of a scene without noise is seen through, and how often.
@@ -101,13 +99,7 @@ def view_examples(
     assert hypotheses is not None
     T_world_cam = frame.T_world_cam
     assert T_world_cam is not None
-    clouds = {i: frame.object_points(i) for i in frame.object_ids}
-    clouds = {i: points for i, points in clouds.items() if len(points) >= MIN_PIXELS}
-    if not clouds:
-        return []
-    middle = np.mean([box_center(points) for points in clouds.values()], axis=0)
-    ground = frame.points[frame.valid & (frame.segmap == BACKGROUND)]
-    plane = fit_plane(ground, config.observation, seed, middle)
+    clouds, plane = clouds_and_plane(frame, config.observation, seed)
     found = []
     for object_id, cloud in clouds.items():
         true = scene.object(object_id)
