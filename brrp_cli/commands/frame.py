@@ -9,7 +9,8 @@ import click
 
 from brrp_cli.commands.seed_option import SEED
 from brrp_cli.commands.source_options import SourceOptions, require_output, source_options
-from brrp_cli.errors import FrameError, OutputError
+from brrp_cli.errors import FrameError
+from brrp_cli.files import refuse_existing
 from brrp_cli.progress import note
 from brrp_cli.spoken import counted
 
@@ -49,7 +50,8 @@ def command(
         raise click.UsageError(f"-o must end in .npz, not {output.name!r}")
     source.check()
     picture = output.with_suffix(".masks.png")
-    refuse_existing([output, picture] if makes_masks else [output], overwrite)
+    for path in [output, picture] if makes_masks else [output]:
+        refuse_existing(path, overwrite=overwrite)
 
     from brrp_cli.frames.build import require_objects
     from brrp_cli.frames.npz import save_frame
@@ -71,17 +73,6 @@ def command(
         )
     save_frame(require_objects(frame), output)
     tell(frame.shape, len(frame.object_ids), output, picture if makes_masks else None)
-
-
-def refuse_existing(paths: list[Path], overwrite: bool) -> None:
-    """OutputError if one of the paths is there and may not be replaced."""
-    for path in paths:
-        if path.exists() and not overwrite:
-            raise OutputError(
-                "The output exists already",
-                where=path,
-                fix="pass --overwrite to replace it, or choose another file with -o",
-            )
 
 
 def tell(shape: tuple[int, int], objects: int, output: Path, picture: Path | None) -> None:

@@ -7,7 +7,7 @@ from pathlib import Path
 from shlex import quote
 from typing import TYPE_CHECKING
 
-from brrp_cli.commands.frame import refuse_existing
+from brrp_cli.files import refuse_existing
 from brrp_cli.progress import note
 from brrp_cli.spoken import counted
 
@@ -45,7 +45,7 @@ def make_masks(
     if source.masks is not None:
         return require_objects(frame), MadeMasks(config, None)
     picture = _picture(output)
-    refuse_existing([picture], overwrite)
+    refuse_existing(picture, overwrite=overwrite)
     frame = require_objects(source.make_masks(frame, seed, config))
     tell_made(frame, source.prompt, output)
     return frame.with_masks(frame.segmap), MadeMasks(config, frame.aside)
@@ -73,7 +73,7 @@ def masks_of(
     """A frame that has masks, and how they were made; None where brrp did not make them."""
     if frame.aside is None:
         return frame, None
-    refuse_existing([_picture(output)], overwrite)
+    refuse_existing(_picture(output), overwrite=overwrite)
     made = MadeMasks(config, frame.aside, frame.corrected)
     return frame.with_masks(frame.segmap), made
 

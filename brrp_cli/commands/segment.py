@@ -8,11 +8,12 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from brrp_cli.commands.frame import refuse_existing, tell
+from brrp_cli.commands.frame import tell
 from brrp_cli.commands.json_option import json_option, report_of
 from brrp_cli.commands.method_options import CONFIG_HELP
 from brrp_cli.commands.seed_option import SEED, SEED_HELP
 from brrp_cli.commands.source_options import SourceOptions, require_output, source_options
+from brrp_cli.files import refuse_existing
 from brrp_cli.progress import note
 
 if TYPE_CHECKING:
@@ -107,7 +108,8 @@ def command(
     if twice := [str(i) for i, times in named.items() if times > 1]:
         raise click.UsageError(f"name an id in one --merge or --drop, not in two: {twice[0]}")
     picture, ids = output.with_suffix(".masks.png"), output.with_suffix(".ids.png")
-    refuse_existing([output, picture, ids], overwrite)
+    for path in (output, picture, ids):
+        refuse_existing(path, overwrite=overwrite)
 
     from brrp_cli.config.segmentation import SegmentConfig
     from brrp_cli.frames.build import require_objects
