@@ -17,6 +17,7 @@ from brrp_cli.planning.numbers import quaternion_wxyz, spell
 # Meshes are drawn from group 2 and collide in group 3, as MuJoCo's viewer expects it.
 VISUAL, COLLISION = "2", "3"
 FURNITURE_COLOUR = (0.6, 0.6, 0.65)  # RGB, 0 to 1
+TABLE_COLOUR = (0.7, 0.66, 0.6, 1.0)  # RGBA
 CLEARANCE = 0.0005  # metres between the table and what is put on it
 
 
@@ -84,7 +85,7 @@ def scene_mjcf(
     if table is not None:
         place = ET.SubElement(world, "body", {"name": "table", **_pose(table.T_frame_table)})
         half = spell(table.size / 2)
-        ET.SubElement(place, "geom", name="table", type="box", size=half, rgba="0.7 0.66 0.6 1")
+        ET.SubElement(place, "geom", name="table", type="box", size=half, rgba=spell(TABLE_COLOUR))
         for name, walls in table.furniture.items():
             _add_furniture(assets, world, name, walls)
     for name, body in bodies.items():

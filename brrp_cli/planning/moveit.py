@@ -31,7 +31,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brrp_cli.planning.body import Body
-from brrp_cli.planning.mjcf import FURNITURE_COLOUR, Table
+from brrp_cli.planning.mjcf import FURNITURE_COLOUR, TABLE_COLOUR, Table
 from brrp_cli.planning.numbers import quaternion_wxyz, spell
 
 if TYPE_CHECKING:
@@ -39,7 +39,6 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 NAME, TABLE = "brrp", "table"
-TABLE_COLOUR = (0.7, 0.66, 0.6, 1.0)
 # shape_msgs/SolidPrimitive
 BOX = 1
 # By object, its named frames in the frame of the results, (4, 4) each, the best grasp first.
