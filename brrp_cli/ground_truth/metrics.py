@@ -19,9 +19,7 @@ if TYPE_CHECKING:
 Points = NDArray[np.floating]
 
 
-def evaluation_grid(
-    center: Points, half_width: float = 0.2, spacing: float = 0.015
-) -> NDArray[np.float64]:
+def evaluation_grid(center: Points, half_width: float, spacing: float) -> NDArray[np.float64]:
     """Nodes (m^3, 3) of the cubic grid around `center` (3,), metres; x varies slowest.
 
     The grid is symmetric about the center, which is a node, and reaches the last whole step within

@@ -24,7 +24,7 @@ def cube(side: float, center=(0, 0, 0)) -> trimesh.Trimesh:
 
 
 def test_grid_is_the_published_one():
-    grid = evaluation_grid(np.array([1.0, 2.0, 3.0]))
+    grid = evaluation_grid(np.array([1.0, 2.0, 3.0]), half_width=0.2, spacing=0.015)
     assert grid.shape == (27**3, 3)
     np.testing.assert_allclose(grid.mean(axis=0), [1, 2, 3])
     np.testing.assert_allclose(grid.min(axis=0), [1 - 0.195, 2 - 0.195, 3 - 0.195])

@@ -12,8 +12,6 @@ from brrp_cli.dependencies import import_open3d
 from brrp_cli.prior.build.coloured_mesh import PaintedMesh
 from brrp_cli.raycast import raycasting_scene
 
-RAYS = 3_000
-
 
 @dataclass(frozen=True)
 class SeenSide:
@@ -34,7 +32,7 @@ def directions(count: int) -> NDArray[np.float64]:
     return np.stack([ring * np.cos(angle), ring * np.sin(angle), z], axis=-1)
 
 
-def views_around(mesh: PaintedMesh, count: int, rays: int = RAYS) -> list[SeenSide]:
+def views_around(mesh: PaintedMesh, count: int, rays: int) -> list[SeenSide]:
     """The mesh from `count` directions, with about `rays` parallel rays through its silhouette's
     box.
 

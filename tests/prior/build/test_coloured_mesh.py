@@ -90,6 +90,6 @@ def test_far_from_the_origin_nothing_changes():
     near, far = box(), box()
     far.apply_translation([40.0, -90.0, 3.0])
     for one, two in zip(
-        views_around(unpainted(near), 6), views_around(unpainted(far), 6), strict=True
+        views_around(unpainted(near), 6, 3000), views_around(unpainted(far), 6, 3000), strict=True
     ):
         np.testing.assert_allclose(one.points, two.points, atol=1e-4)
