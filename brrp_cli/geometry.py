@@ -69,6 +69,12 @@ def turns_about(rotations: NDArray[np.float64], middle: NDArray[np.float64]) -> 
     return T
 
 
+def turn_about_z(angle: float) -> NDArray[np.float64]:
+    """(3, 3) rotation by `angle` radians about z, from x towards y."""
+    c, s = np.cos(angle), np.sin(angle)
+    return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+
+
 def rotation_angle(rotation: Array) -> float:
     """Radians by which a rotation (3, 3) turns, 0 to pi."""
     return float(np.arccos(np.clip((np.trace(rotation) - 1) / 2, -1, 1)))

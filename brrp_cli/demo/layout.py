@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from brrp_cli.geometry import normalise, similarity
+from brrp_cli.geometry import normalise, similarity, turn_about_z
 
 if TYPE_CHECKING:
     import trimesh
@@ -36,14 +36,10 @@ def stand_apart(
         else:
             return None
         placed.append((spot, radius))
-        poses.append(similarity(1.0, turn(rng.uniform(0, 2 * np.pi)), np.array([*spot, 0.0])))
+        poses.append(
+            similarity(1.0, turn_about_z(rng.uniform(0, 2 * np.pi)), np.array([*spot, 0.0]))
+        )
     return poses
-
-
-def turn(angle: float) -> NDArray[np.float64]:
-    """(3, 3) rotation about z."""
-    c, s = np.cos(angle), np.sin(angle)
-    return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
 
 
 def camera_pose(

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from brrp_cli.config import KinConfig
+from brrp_cli.geometry import turn_about_z
 from brrp_cli.kin import bend, unknowns
 from brrp_cli.kin.evidence import Evidence
 from brrp_cli.kin.ways_out import ways_out
@@ -109,8 +110,7 @@ class BentFit:
 
     @property
     def _turned(self) -> Array:
-        c, s = np.cos(self.turn), np.sin(self.turn)
-        return np.array([[c, -s, 0], [s, c, 0], [0, 0, 1.0]])
+        return turn_about_z(self.turn)
 
     def _sizes(self, v: Array) -> Array:
         """(n, 3): metres of one unit of v."""

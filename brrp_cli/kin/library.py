@@ -15,6 +15,7 @@ from scipy.ndimage import label
 from scipy.spatial import ConvexHull
 
 from brrp_cli.config import KinConfig
+from brrp_cli.geometry import turn_about_z
 from brrp_cli.prior.distance_field import DistanceField
 from brrp_cli.prior.shard import DISTANCES
 from brrp_cli.prior.store import Prior
@@ -234,8 +235,7 @@ def _rectangle_turn(points: Array, turns: int) -> Array:
     along = np.stack([np.cos(angles), np.sin(angles)])
     first, second = hull @ along, hull @ np.stack([-along[1], along[0]])
     best = angles[np.argmin(np.ptp(first, axis=0) * np.ptp(second, axis=0))]
-    c, s = np.cos(best), np.sin(best)
-    return np.array([[c, s, 0], [-s, c, 0], [0, 0, 1.0]])
+    return turn_about_z(-best)
 
 
 def _coarse(library: Library, config: KinConfig) -> NDArray[np.float16]:

@@ -10,7 +10,7 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
 from brrp_cli.config import KinConfig
-from brrp_cli.geometry import similarity
+from brrp_cli.geometry import similarity, turn_about_z
 from brrp_cli.kin.bend import TERMS
 from brrp_cli.kin.bending import BentFit, BoxPoints, bent
 from brrp_cli.kin.evidence import Evidence
@@ -40,10 +40,7 @@ class BentShape:
     @property
     def T_plane_shape(self) -> Array:
         """(4, 4) rigid, from the middle of the shape's box."""
-        c, s = np.cos(self.fit.turn), np.sin(self.fit.turn)
-        return similarity(
-            rotation=np.array([[c, -s, 0], [s, c, 0], [0, 0, 1.0]]), translation=self.fit.middle
-        )
+        return similarity(rotation=turn_about_z(self.fit.turn), translation=self.fit.middle)
 
     def shape(self, config: KinConfig) -> StoredShape:
         """Metres, about the middle of its box."""

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from brrp_cli.config.seen_mask import MaskPosesConfig
 from brrp_cli.frames.frame import Frame
+from brrp_cli.geometry import turn_about_z
 from brrp_cli.observation.support_plane import Plane, plane_frame
 from brrp_cli.registration.initial_poses import turns
 from brrp_cli.registration.mask_edges import around, reach_of
@@ -88,11 +89,9 @@ def poses_from_mask(model: ModelGeometry, seen: MaskOutline, config: MaskPosesCo
 def _turned_both_ways(T_plane_model: Array, angle: float) -> Array:
     """Each of (b, 4, 4), and it turned by `angle` either way about where it stands, (3b, 4, 4)."""
     found = [T_plane_model]
-    for sign in (-1, 1):
-        c, s = np.cos(angle), sign * np.sin(angle)
-        R = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])
+    for turned in (-angle, angle):
         T = T_plane_model.copy()
-        T[:, :3, :3] = R @ T[:, :3, :3]
+        T[:, :3, :3] = turn_about_z(turned) @ T[:, :3, :3]
         found.append(T)
     return np.concatenate(found)
 

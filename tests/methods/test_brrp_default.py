@@ -13,9 +13,8 @@ from table_scene import T_CAM_WORLD, T_WORLD_CAM, box, in_camera, photograph, pl
 
 from brrp_cli import Reconstructor, open_posterior, open_prior, reconstruct, write_results
 from brrp_cli.config import SearchConfig, preset
-from brrp_cli.demo.layout import turn
 from brrp_cli.errors import BrrpError, RetrievalError
-from brrp_cli.geometry import similarity, transform_points
+from brrp_cli.geometry import similarity, transform_points, turn_about_z
 from brrp_cli.ground_truth.surface_metrics import MeshSurface
 from brrp_cli.methods.base import Setup
 from brrp_cli.methods.earlier_views import ALONE
@@ -299,7 +298,7 @@ def test_the_number_of_threads_changes_no_byte(folder, truth, result):
 def seen_from(mesh, turned):
     """A frame of a mesh, in the first camera's frame, from a camera that has gone round the table;
     the same as a table that has turned."""
-    around = similarity(rotation=turn(turned))
+    around = similarity(rotation=turn_about_z(turned))
     T = T_CAM_WORLD @ around @ T_WORLD_CAM
     frame = photograph({STRANGE: in_camera(mesh, T)})
     return replace(frame, T_world_cam=np.linalg.inv(around) @ T_WORLD_CAM), T

@@ -10,8 +10,7 @@ from table_scene import MESHES, T_CAM_WORLD, T_WORLD_CAM, K, in_camera, photogra
 
 from brrp_cli.config import preset
 from brrp_cli.config.tracking import SharpenConfig
-from brrp_cli.demo.layout import turn
-from brrp_cli.geometry import similarity, transform_points
+from brrp_cli.geometry import similarity, transform_points, turn_about_z
 from brrp_cli.methods.base import EarlierView
 from brrp_cli.methods.earlier_views import EarlierViews, Guess
 from brrp_cli.observation.pixel_noise import pixel_noise
@@ -27,7 +26,7 @@ ID = 5
 DEFAULT = preset("default").hypotheses
 SENSOR = DEFAULT.sensor
 # The camera stands still and the table turns: the same as a camera that goes round.
-AROUND = T_CAM_WORLD @ similarity(rotation=turn(np.pi)) @ T_WORLD_CAM
+AROUND = T_CAM_WORLD @ similarity(rotation=turn_about_z(np.pi)) @ T_WORLD_CAM
 NORMAL = T_CAM_WORLD[:3, 2]
 TABLE = Plane(NORMAL, float(-NORMAL @ T_CAM_WORLD[:3, 3]))
 

@@ -19,10 +19,9 @@ from table_scene import (
 )
 
 from brrp_cli.config import VerificationConfig
-from brrp_cli.demo.layout import turn
 from brrp_cli.frames.frame import Frame
 from brrp_cli.frames.projection import at_pixels, depth_behind
-from brrp_cli.geometry import backproject, project, similarity
+from brrp_cli.geometry import backproject, project, similarity, turn_about_z
 from brrp_cli.registration import verification as verifier
 from brrp_cli.registration.model import Model, search_model
 
@@ -51,7 +50,7 @@ def seen():
 
 def moved(T_cam_model, *, world=(0.0, 0.0, 0.0), yaw=0.0):
     """Moved by metres along the world's axes, after a turn about the model's upright axis."""
-    T = T_cam_model @ similarity(1.0, turn(yaw))
+    T = T_cam_model @ similarity(1.0, turn_about_z(yaw))
     T[:3, 3] += T_CAM_WORLD[:3, :3] @ world
     return T
 

@@ -10,10 +10,10 @@ import trimesh
 from bin_scene import FLOOR, HEIGHT, LENGTH, T_WORLD_CAM, WALL, WIDTH, YAW, seen, standing
 
 from brrp_cli.config.segmentation import SegmentConfig
-from brrp_cli.demo.layout import camera_pose, turn
+from brrp_cli.demo.layout import camera_pose
 from brrp_cli.errors import FrameError
 from brrp_cli.frames.build import make_frame
-from brrp_cli.geometry import similarity, transform_points
+from brrp_cli.geometry import similarity, transform_points, turn_about_z
 from brrp_cli.raycast import raycasting_scene
 from brrp_cli.segmentation.furniture import furniture, segmentation_of
 from brrp_cli.segmentation.outlines import corners_of, normals_of, plain, shifted
@@ -21,7 +21,9 @@ from brrp_cli.segmentation.seen_table import see_table
 from brrp_cli.shapes import solids
 
 CONFIG = SegmentConfig()
-T_BIN_CAM = np.linalg.inv(np.linalg.inv(T_WORLD_CAM) @ similarity(1.0, turn(YAW), np.zeros(3)))
+T_BIN_CAM = np.linalg.inv(
+    np.linalg.inv(T_WORLD_CAM) @ similarity(1.0, turn_about_z(YAW), np.zeros(3))
+)
 THING = standing((0.08, 0.06, 0.07), 0.05, 0.02)
 SQUARE = np.array([[0.0, 0.0], [2.0, 0.0], [2.0, 1.0], [0.0, 1.0]])
 
@@ -91,7 +93,7 @@ def test_what_is_hidden_of_a_wall_is_there():
 def test_where_the_border_cuts_a_bin_is_no_wall():
     aside = camera_pose(np.array([0.14, 0.12, 0.03]), 0.6, np.deg2rad(60.0), 0.9)
     frame = seen(THING, T_world_cam=aside)
-    T = np.linalg.inv(np.linalg.inv(aside) @ similarity(1.0, turn(YAW), np.zeros(3)))
+    T = np.linalg.inv(np.linalg.inv(aside) @ similarity(1.0, turn_about_z(YAW), np.zeros(3)))
     found = walls(frame, T)
     outer = np.abs(found.mean(axis=1)[:, :2]) / (np.array([LENGTH, WIDTH]) / 2)
     np.testing.assert_allclose(outer.max(axis=1), 1.0, atol=0.06)

@@ -19,9 +19,9 @@ from bin_scene import (
 )
 
 from brrp_cli.config.segmentation import SegmentConfig
-from brrp_cli.demo.layout import camera_pose, turn
+from brrp_cli.demo.layout import camera_pose
 from brrp_cli.frames.frame import Frame
-from brrp_cli.geometry import similarity, transform_points
+from brrp_cli.geometry import similarity, transform_points, turn_about_z
 from brrp_cli.segmentation.bins import find_bins
 from brrp_cli.segmentation.plan_cells import plan_cells
 from brrp_cli.segmentation.platforms import find_platforms
@@ -53,7 +53,7 @@ def test_a_bin_is_found_with_its_floor_and_its_rim(noise):
     (one,) = table.bins
     assert one.rim == pytest.approx(HEIGHT, abs=0.006)
     assert one.floor == pytest.approx(FLOOR, abs=0.003 if noise else 0.001)
-    T_cam_bin = np.linalg.inv(T_WORLD_CAM) @ similarity(1.0, turn(YAW), np.zeros(3))
+    T_cam_bin = np.linalg.inv(T_WORLD_CAM) @ similarity(1.0, turn_about_z(YAW), np.zeros(3))
     x, y = LENGTH / 2, WIDTH / 2
     for shift, inside in ((-0.025, True), (0.012, False)):
         corners = [[s * (x + shift), t * (y + shift), 0.0] for s in (-1, 1) for t in (-1, 1)]

@@ -9,9 +9,8 @@ from bin_scene import YAW, seen
 
 from brrp_cli.config import ObservationConfig
 from brrp_cli.config.segmentation import SegmentConfig
-from brrp_cli.demo.layout import turn
 from brrp_cli.frames.frame import Frame
-from brrp_cli.geometry import transform_points
+from brrp_cli.geometry import transform_points, turn_about_z
 from brrp_cli.observation.ray_samples import scene_plane
 from brrp_cli.observation.support_plane import Plane
 from brrp_cli.segmentation.furniture import Furniture, furniture
@@ -118,7 +117,7 @@ def test_it_is_a_solid_on_the_table():
     found, plane = around(frame)
     (solid,) = found.platforms
     assert len(found.solids) == 1
-    world = transform_points(frame.T_world_cam, solid) @ turn(YAW)
+    world = transform_points(frame.T_world_cam, solid) @ turn_about_z(YAW)
     assert np.abs(np.abs(world[:, 0]) - LENGTH / 2).max() < 0.012
     assert np.abs(np.abs(world[:, 1]) - WIDTH / 2).max() < 0.012
     assert sorted(world[:, 2]) == pytest.approx([0.0] * 4 + [HEIGHT] * 4, abs=0.002)

@@ -6,10 +6,10 @@ import numpy as np
 import trimesh
 from table_scene import in_camera, photograph
 
-from brrp_cli.demo.layout import camera_pose, turn
+from brrp_cli.demo.layout import camera_pose
 from brrp_cli.frames.build import make_frame
 from brrp_cli.frames.frame import Frame
-from brrp_cli.geometry import similarity
+from brrp_cli.geometry import similarity, turn_about_z
 from brrp_cli.shapes import solids
 
 LENGTH, WIDTH, HEIGHT, FLOOR, WALL = 0.36, 0.26, 0.1, 0.006, 0.004
@@ -32,7 +32,7 @@ def seen(
     without_depth: np.ndarray | None = None,
 ) -> Frame:
     """A bin, turned by YAW, and things 1, 2, ...; all are placed in its own frame."""
-    T_cam_bin = np.linalg.inv(T_world_cam) @ similarity(1.0, turn(YAW), np.zeros(3))
+    T_cam_bin = np.linalg.inv(T_world_cam) @ similarity(1.0, turn_about_z(YAW), np.zeros(3))
     meshes = {number: in_camera(thing, T_cam_bin) for number, thing in enumerate(things, start=1)}
     meshes[BIN] = in_camera(bin_mesh() if bin is None else bin, T_cam_bin)
     clean = photograph(meshes, T_world_cam=T_world_cam)

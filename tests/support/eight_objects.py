@@ -10,11 +10,11 @@ import numpy as np
 import trimesh
 from table_scene import SHAPE, K, in_camera
 
-from brrp_cli.demo.layout import camera_pose, turn
+from brrp_cli.demo.layout import camera_pose
 from brrp_cli.frames.build import make_frame
 from brrp_cli.frames.frame import Frame
 from brrp_cli.frames.npz import save_frame
-from brrp_cli.geometry import similarity
+from brrp_cli.geometry import similarity, turn_about_z
 from brrp_cli.ground_truth.scenes import Scene, find_scenes
 from brrp_cli.methods.pointsdf.network import NetworkConfig
 from brrp_cli.raycast import look
@@ -70,7 +70,7 @@ def write_scenes(folder: Path, count: int = 1) -> list[Scene]:
         for i, name in enumerate(MESHES):
             x, y = SPOTS[(i + 3 * number) % len(SPOTS)]
             yaw = YAWS[name] + number
-            T_world_mesh = similarity(1.0, turn(yaw), np.array([x, y, 0.0]))
+            T_world_mesh = similarity(1.0, turn_about_z(yaw), np.array([x, y, 0.0]))
             things.append(in_camera(MESHES[name], np.linalg.inv(T_WORLD_CAM) @ T_world_mesh))
             truth.append(
                 {

@@ -17,9 +17,9 @@ from brrp_cli.completion.completed_mean import network_grid, shell_of, within
 from brrp_cli.completion.seen_surface import SeenSurface, seen_surface
 from brrp_cli.completion.visible_part import VisiblePart
 from brrp_cli.config import FeatureConfig, MeanConfig, preset
-from brrp_cli.demo.layout import camera_pose, turn
+from brrp_cli.demo.layout import camera_pose
 from brrp_cli.frames.frame import Frame
-from brrp_cli.geometry import backproject, similarity
+from brrp_cli.geometry import backproject, similarity, turn_about_z
 from brrp_cli.observation.pixel_noise import pixel_noise
 from brrp_cli.observation.support_plane import Plane
 from brrp_cli.prior.build.find_meshes import MeshSource
@@ -91,7 +91,7 @@ def stored(name: str) -> PriorObject:
 
 def placed(x: float, y: float, yaw: float) -> np.ndarray:
     """T_cam_mesh (4, 4) of what stands on the table there, turned by `yaw`."""
-    return T_CAM_WORLD @ similarity(1.0, turn(yaw), np.array([x, y, 0.0]))
+    return T_CAM_WORLD @ similarity(1.0, turn_about_z(yaw), np.array([x, y, 0.0]))
 
 
 def in_camera(mesh: trimesh.Trimesh, T_cam_mesh: np.ndarray) -> trimesh.Trimesh:
