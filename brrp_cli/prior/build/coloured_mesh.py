@@ -67,7 +67,9 @@ def load_painted(path: Path, units: str = "m") -> PaintedMesh:
     import trimesh
 
     try:
-        scene = trimesh.load_scene(path, process=False, maintain_order=True)
+        # Not in the order of the file: a vertex on a seam of the texture has several coordinates
+        # there, and would keep one of them.
+        scene = trimesh.load_scene(path, process=False)
         parts = [
             (_bare(mesh, T_scene_mesh, units), _paint(mesh))
             for mesh, T_scene_mesh in _placed(scene)

@@ -47,6 +47,31 @@ def test_a_texture_is_the_right_way_up(tmp_path):
         )
 
 
+def test_faces_on_both_sides_of_a_seam_keep_their_colours(tmp_path):
+    """A vertex on a seam has other coordinates in the texture for each of its faces."""
+    mesh = box()
+    side = np.repeat(np.arange(6), 2)[np.argsort(np.argsort(mesh.face_normals @ [1, 2, 4]))]
+    colours = np.array([RED, GREEN, (30, 60, 200), (220, 200, 40), (240, 240, 240), (90, 20, 120)])
+    # Six squares of colour in black, one for each side of the box.
+    pixels = np.zeros((64, 6 * 64, 3), np.uint8)
+    for number, colour in enumerate(colours):
+        pixels[16:48, number * 64 + 16 : number * 64 + 48] = colour
+    Image.fromarray(pixels).save(tmp_path / "box.png")
+    (tmp_path / "box.mtl").write_text("newmtl paint\nmap_Kd box.png\n")
+    lines = ["mtllib box.mtl", "usemtl paint"]
+    lines += ["v {} {} {}".format(*v) for v in mesh.vertices]
+    square = np.array([[0.3, 0.3], [0.7, 0.3], [0.5, 0.7]])
+    for number in range(6):
+        lines += [f"vt {(number + u) / 6} {v}" for u, v in square]
+    for face, number in zip(mesh.faces, side, strict=True):
+        corners = [f"{v + 1}/{3 * number + i + 1}" for i, v in enumerate(face)]
+        lines.append("f " + " ".join(corners))
+    (tmp_path / "box.obj").write_text("\n".join(lines) + "\n")
+    for seen in views_around(load_painted(tmp_path / "box.obj"), 12, 300):
+        which = np.argmax(seen.normals @ mesh.face_normals.T, axis=1)
+        np.testing.assert_allclose(seen.rgb, colours[side[which]], atol=2)
+
+
 def test_a_plain_material(tmp_path):
     (tmp_path / "box.mtl").write_text("newmtl paint\nKd 0.8 0.1 0.1\n")
     lines = ["mtllib box.mtl", "usemtl paint"]
