@@ -46,6 +46,21 @@ def exists(path: Path) -> bool:
         return False
 
 
+def read_text(path: Path) -> str:
+    """UTF-8 text of a file that may be anything, without the mark that some editors begin it with.
+    Errors: OSError; ValueError."""
+    try:
+        return path.read_text(encoding="utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise ValueError("bytes that are no UTF-8 text") from error
+
+
+def trouble_of(error: Exception) -> str:
+    """What an error of a file says, in words and without its path, which `where` tells."""
+    said = error.strerror if isinstance(error, OSError) else None
+    return said or str(error)
+
+
 def parse_json(text: str | bytes) -> Any:
     """JSON from a file that may be anything. Errors: ValueError."""
     try:

@@ -25,6 +25,7 @@ _FOCAL = 0.05, 1000.0
 _LARGER, _ALIKE = 1.4, 0.05
 # Metres from the camera to the world's origin above which the unit of a pose is suspect.
 _FAR = 50.0
+_CALIBRATED = "take K of the camera's calibration for images of this size, in pixels"
 _EXPECTED_K = "[[fx, 0, cx], [0, fy, cy], [0, 0, 1]], pixels, fx and fy > 0"
 
 
@@ -33,7 +34,7 @@ def check_intrinsics(
 ) -> NDArray[np.float64]:
     """`K` (3, 3) as float64. Errors: FrameError if it is no pinhole matrix of an (H, W) image."""
 
-    def refuse(what: str, fix: str | None = None) -> FrameError:
+    def refuse(what: str, fix: str = _CALIBRATED) -> FrameError:
         found = np.array2string(K, separator=", ").replace("\n", "")
         return FrameError(what, where=source, expected=_EXPECTED_K, found=found, fix=fix)
 
@@ -43,7 +44,7 @@ def check_intrinsics(
             where=source,
             expected=(3, 3),
             found=K.shape,
-            fix=advice("K", K),
+            fix=advice("K", K) or _CALIBRATED,
         )
     if K.dtype.kind not in "iuf" or not np.isfinite(K).all():
         raise refuse("K does not hold finite numbers")
@@ -51,7 +52,10 @@ def check_intrinsics(
     if (K[2, :2] != 0).any() and (K[:2, 2] == 0).all() and K[2, 2] == 1:
         raise refuse("K is transposed", "pass K.T")
     if K[0, 0] <= 0 or K[1, 1] <= 0:
-        raise refuse("K has a focal length that is not positive")
+        raise refuse(
+            "K has a focal length that is not positive",
+            "write fx and fy above 0; a sign that turns an axis, as in OpenGL, is left out",
+        )
     # Back-projection knows no skew, and skew is 0 in every camera that people use here.
     if not np.array_equal(K[2], [0, 0, 1]) or K[1, 0] != 0 or abs(K[0, 1]) > 1e-3 * K[0, 0]:
         raise refuse("K is no pinhole matrix without skew")
@@ -96,23 +100,42 @@ def check_intrinsics(
     return K
 
 
-def check_pose(T: NDArray[Any], source: Path | None) -> NDArray[np.float64]:
-    """`T_world_cam` (4, 4) as float64. Errors: FrameError if it is no rigid transform."""
-    rigid = (
+def _written(matrix: NDArray[Any]) -> str:
+    return np.array2string(matrix, separator=", ", precision=4).replace("\n", "")
+
+
+def _is_rigid(T: NDArray[Any]) -> bool:
+    """Whether it is, but for its handedness."""
+    return (
         T.shape == (4, 4)
         and T.dtype.kind in "iuf"
         and bool(np.isfinite(T).all())
         and np.allclose(T[3], [0, 0, 0, 1], atol=1e-6)
         and np.allclose(T[:3, :3] @ T[:3, :3].T, np.eye(3), atol=1e-3)
-        and bool(np.linalg.det(T[:3, :3]) > 0)
     )
-    if not rigid:
+
+
+def check_pose(T: NDArray[Any], source: Path | None) -> NDArray[np.float64]:
+    """`T_world_cam` (4, 4) as float64. Errors: FrameError if it is no rigid transform."""
+    if not _is_rigid(T):
         raise FrameError(
             "T_world_cam is no rigid transform",
             where=source,
             expected="(4, 4): rotation, translation in metres, last row 0 0 0 1",
-            found=np.array2string(T, separator=", ", precision=4).replace("\n", ""),
-            fix=advice("T_world_cam", T) or "transpose it if it was written column by column",
+            found=_written(T),
+            fix="transpose it: it was written column by column"
+            if _is_rigid(T.T)
+            else advice("T_world_cam", T)
+            or "take a rotation without scale, such as of a quaternion of length 1",
+        )
+    if np.linalg.det(T[:3, :3]) < 0:
+        raise FrameError(
+            "T_world_cam is no rigid transform: it mirrors, so it is left-handed",
+            where=source,
+            expected="a rotation with determinant 1; the camera's x right, y down, z forward",
+            found=f"determinant -1 of {_written(T[:3, :3])}",
+            fix="negate the axis that points the wrong way, in the camera or in the world; or take"
+            " the pose in a right-handed world (Unity's is left-handed)",
         )
     away = float(np.linalg.norm(T[:3, 3]))
     if away > _FAR:

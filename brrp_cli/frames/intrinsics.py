@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brrp_cli.errors import FrameError
-from brrp_cli.files import parse_json
+from brrp_cli.files import parse_json, read_text, trouble_of
 from brrp_cli.frames.arrays import check_file
 from brrp_cli.frames.mat import read_meta
 
@@ -26,6 +26,8 @@ _HEIGHTS = ("height", "img_height", "image_height")
 _EXPECTED = (
     "fx, fy and cx, cy (or ppx, ppy; or x_offset, y_offset); or a 3 x 3 K; or a ROS camera_info"
 )
+_EXAMPLE = '{"fx": 615.2, "fy": 615.4, "cx": 320.5, "cy": 240.1}'
+_FIX = f"write the camera's own numbers, in pixels, as JSON: {_EXAMPLE}"
 
 
 @dataclass(frozen=True)
@@ -49,6 +51,7 @@ def _number(value: object, key: str, path: Path) -> float:
             where=f"{path}: {key}",
             expected="a number",
             found=repr(value),
+            fix=f"write a finite number without quotes, as in {_EXAMPLE}",
         )
     return float(value)
 
@@ -79,7 +82,11 @@ def _matrix(data: dict[str, Any], path: Path) -> NDArray[np.float64] | None:
         K = np.empty(0)
     if K.size != 9:
         raise FrameError(
-            "K is no 3 x 3 matrix", where=f"{path}: {key}", expected="9 numbers", found=value
+            "K is no 3 x 3 matrix",
+            where=f"{path}: {key}",
+            expected="9 numbers",
+            found=value,
+            fix="write it row by row: [[fx, 0, cx], [0, fy, cy], [0, 0, 1]]",
         )
     K = K.reshape(3, 3)
     # Open3D's PinholeCameraIntrinsic writes its matrix column by column.
@@ -100,17 +107,25 @@ def read_intrinsics(path: Path) -> Intrinsics:
         meta = read_meta(path)
         return Intrinsics(meta.K, None, None, meta.depth_scale)
     try:
-        data = parse_json(path.read_text(encoding="utf-8"))
+        data = parse_json(read_text(path))
     except (ValueError, OSError) as error:
         raise FrameError(
-            "The intrinsics are no JSON", where=path, expected=_EXPECTED, found=str(error)
+            "The intrinsics are no JSON",
+            where=path,
+            expected=_EXPECTED,
+            found=trouble_of(error),
+            fix=_FIX,
         ) from error
     data = _unwrapped(data)
     if isinstance(data, list):
         data = {"K": data}
     if not isinstance(data, dict):
         raise FrameError(
-            "The intrinsics are no JSON object", where=path, expected=_EXPECTED, found=data
+            "The intrinsics are no JSON object",
+            where=path,
+            expected=_EXPECTED,
+            found=data,
+            fix=_FIX,
         )
     K = _matrix(data, path)
     if K is None:
@@ -122,6 +137,7 @@ def read_intrinsics(path: Path) -> Intrinsics:
                 where=path,
                 expected=_EXPECTED,
                 found=", ".join(data) or "no keys",
+                fix=_FIX,
             )
         K = np.array([[fx, 0, cx], [0, fy, cy], [0, 0, 1]])
     for key in ("D", "d", "coeffs", "distortion", "distortion_coefficients"):

@@ -74,6 +74,7 @@ def test_meshes_stand_in_the_world(folder):
         ('{"pose": "here"}', "no 4 x 4 matrix"),
         (json.dumps((2 * np.eye(4)).tolist()), "no rigid transform"),
         (json.dumps(T_WORLD_CAM.T.tolist()), "transpose it"),
+        (json.dumps((T_WORLD_CAM @ np.diag([1, 1, -1, 1])).tolist()), "left-handed"),
     ],
 )
 def test_a_pose_that_is_none_is_told_by_its_file(text, says, folder):
@@ -82,4 +83,16 @@ def test_a_pose_that_is_none_is_told_by_its_file(text, says, folder):
     result = run(folder, "t.json", "-o", folder / "f.npz", command="frame")
     assert result.exit_code == 1 and result.output.count("Error: ") == 1, result.output
     assert says in result.output and f"where:    {folder / 't.json'}" in result.output
+    assert "fix: " in result.output
+    assert says == "transpose it" or "transpose" not in result.output
     assert not (folder / "f.npz").exists()
+
+
+@pytest.mark.parametrize("suffix", [".json", ".txt"])
+def test_a_pose_that_an_editor_marked_as_utf_8_is_read(suffix, folder):
+    text = json.dumps(T_WORLD_CAM.tolist())
+    text = text if suffix == ".json" else " ".join(map(str, T_WORLD_CAM.ravel()))
+    (folder / f"t{suffix}").write_text(text, encoding="utf-8-sig")
+    result = run(folder, f"t{suffix}", "-o", folder / "f.npz", command="frame")
+    assert result.exit_code == 0, result.output
+    assert load_frame(folder / "f.npz").T_world_cam == pytest.approx(T_WORLD_CAM)
