@@ -12,10 +12,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from brrp_cli.errors import FrameError
 from brrp_cli.frames.camera import check_intrinsics, check_pose, fit_intrinsics
-from brrp_cli.frames.frame import Frame
+from brrp_cli.frames.frame import ONE_CAMERA, Frame
+from brrp_cli.frames.masks import MAX_OBJECTS, check_masks
 from brrp_cli.frames.misplaced import advice, swapped
 from brrp_cli.geometry import backproject
-from brrp_cli.spoken import option
+from brrp_cli.spoken import counted, option
 
 log = logging.getLogger(__name__)
 
@@ -25,7 +26,6 @@ NEAREST_MEDIAN = 0.01
 # Cameras measure from about 0.1 m, and tables stand within a few: beyond, the unit is suspect.
 USUAL_MEDIAN = 0.15, 4.0
 FARTHEST = 100.0  # metres; single values beyond it are a sensor's or a format's, not a place
-MAX_OBJECTS = 1000
 _GREY = 128
 
 
@@ -40,6 +40,7 @@ def make_frame(
     depth_scale: float | None = None,
     source: Path | None = None,
     files: Mapping[str, Path] | None = None,
+    background_told: bool = False,
 ) -> Frame:
     """Check one camera's arrays and make a frame of them. The arrays are copied, never changed.
 
@@ -49,16 +50,18 @@ def make_frame(
     Parameters
     ----------
     rgb : (H, W, 3) uint8; None = grey
-    segmap : (H, W) integers (or floats that hold integers), 0 = background, any other id is an
-        object; None = no masks yet (for `segment`)
+    segmap : (H, W) integers (or floats that hold integers), 0 = background, any other id but -1 is
+        an object; None = no masks yet (for `segment`)
     depth : (H, W), along z. Floats are metres, integers millimetres, unless `depth_scale` is
-        given; 0, NaN and inf = no return
+        given; 0, NaN, inf and the largest number of an unsigned type = no return
     K : (3, 3) pinhole intrinsics, pixels; needed with `depth`, fitted where `xyz` comes without
     xyz : (H, W, 3) points instead of `depth`, metres, camera frame (x right, y down, z forward)
     T_world_cam : (4, 4) rigid transform, camera frame to world frame
     depth_scale : raw value x depth_scale = metres
     source : file or folder, for messages
     files : the file of single arrays, for messages, where they have one each: array's name -> path
+    background_told : whether something beside the masks tells which of their ids are background, as
+        a scene's true objects do: no id is refused then
 
     Errors: FrameError, which names the array, what was expected and what was found.
     """
@@ -74,15 +77,22 @@ def make_frame(
     if depth is not None:
         if K is None:
             raise FrameError(
-                "Depth without intrinsics", where=source, expected="K, (3, 3)", found="no K"
+                "Depth without intrinsics",
+                where=source,
+                expected="K, (3, 3)",
+                found="no K",
+                fix="pass K = [[fx, 0, cx], [0, fy, cy], [0, 0, 1]] of the camera, in pixels",
             )
         z = _depth_metres(np.asarray(depth), depth_scale, where["depth"])
         height, width = z.shape
+        if np.shape(K) == (3, 3):  # else depth and K may be swapped, which K's own check tells
+            _refuse_other_sizes((height, width), rgb, segmap, where)
         K_checked = check_intrinsics(np.asarray(K), (height, width), where["K"])
         points = backproject(z, K_checked)
     elif xyz is not None:
         points = _points_metres(np.asarray(xyz), depth_scale, source)
         height, width = points.shape[:2]
+        _refuse_other_sizes((height, width), rgb, segmap, where)
         given = None if K is None else check_intrinsics(np.asarray(K), (height, width), source)
         K_checked = fit_intrinsics(points, given, source)
     else:
@@ -96,7 +106,9 @@ def make_frame(
     return Frame(
         rgb=grey if rgb is None else _colour(rgb, where["rgb"]),
         points=points,
-        segmap=nowhere if segmap is None else _masks(segmap, where["segmap"]),
+        segmap=nowhere
+        if segmap is None
+        else check_masks(segmap, where["segmap"], background_told=background_told),
         K=K_checked,
         T_world_cam=None if T_world_cam is None else check_pose(np.asarray(T_world_cam), source),
         source=source,
@@ -115,6 +127,28 @@ def require_objects(frame: Frame) -> Frame:
             " segment(frame)",
         )
     return frame
+
+
+def _refuse_other_sizes(
+    shape: tuple[int, int],
+    rgb: ArrayLike | None,
+    segmap: ArrayLike | None,
+    where: Mapping[str, Path | None],
+) -> None:
+    """FrameError where colour or masks have another size (H, W) than depth. Intrinsics are judged
+    by that size, so that they would be blamed."""
+    for name, given in (("rgb", rgb), ("segmap", segmap)):
+        found = () if given is None else np.shape(given)
+        # What has no two axes of pixels is told by its own check.
+        image = len(found) == 3 and found[-1] == 3 if name == "rgb" else len(found) == 2
+        if image and found[:2] != shape:
+            raise FrameError(
+                f"{name} has the wrong shape",
+                where=where[name],
+                expected=f"{(*shape, *found[2:])}: depth has {shape[1]} x {shape[0]} pixels",
+                found=f"{found}: {found[1]} x {found[0]} pixels",
+                fix=ONE_CAMERA,
+            )
 
 
 def _told(array: NDArray[Any]) -> str:
@@ -160,7 +194,27 @@ def _depth_metres(raw: NDArray[Any], scale: float | None, source: Path | None) -
             f" {option('depth_scale')}",
         )
     _numbers(raw, "depth", source)
+    raw = _without_largest(raw, source)
     return _scaled(raw, raw, "depth", scale, source)
+
+
+def _without_largest(raw: NDArray[Any], source: Path | None) -> NDArray[Any]:
+    """Depth with 0 for the largest number of an unsigned type, which sensors and programs write
+    where there is no return: 65535 would be a wall at 65 m."""
+    if raw.dtype.kind != "u":
+        return raw
+    largest = np.iinfo(raw.dtype).max
+    nothing = raw == largest
+    if not nothing.any():
+        return raw
+    log.info(
+        "%s: %s with %d, the largest number of %s: no return",
+        source or "The frame",
+        counted(int(nothing.sum()), "pixel"),
+        largest,
+        raw.dtype,
+    )
+    return np.where(nothing, raw.dtype.type(0), raw)
 
 
 def _points_metres(raw: NDArray[Any], scale: float | None, source: Path | None) -> NDArray[Any]:
@@ -191,7 +245,11 @@ def _scaled(
     """`raw` in metres, float32, once its z has been found to be depth."""
     if scale is not None and not (np.isfinite(scale) and scale > 0):
         raise FrameError(
-            "The depth scale is no positive number", where=source, found=scale, expected="> 0"
+            "The depth scale is no positive number",
+            where=source,
+            expected="> 0",
+            found=scale,
+            fix=_unit_fix(),
         )
     valid = _measured(raw_z, name, source)
     if scale is not None:
@@ -207,8 +265,7 @@ def _scaled(
             where=source,
             expected=f"a median depth of {NEAREST_MEDIAN} to {FARTHEST_MEDIAN:g} m",
             found=f"median {median:.6g} m ({raw.dtype}, {unit})",
-            fix=f"say what one unit is: {option('depth_scale', 0.001)} for millimetres, 0.0002 for"
-            " TUM's 5000 to the metre",
+            fix=_unit_fix(),
         )
     if not USUAL_MEDIAN[0] <= median <= USUAL_MEDIAN[1]:
         log.warning(
@@ -234,6 +291,13 @@ def _scaled(
     return metres
 
 
+def _unit_fix() -> str:
+    return (
+        f"say what one unit is: {option('depth_scale', 0.001)} for millimetres, 0.0002 for TUM's"
+        " 5000 to the metre"
+    )
+
+
 def _measured(raw_z: NDArray[Any], name: str, source: Path | None) -> NDArray[np.bool_]:
     """(H, W) where there is a return. Errors: FrameError for negative depth, and for none."""
     valid: NDArray[np.bool_] = np.isfinite(raw_z) & (raw_z != 0)
@@ -250,7 +314,9 @@ def _measured(raw_z: NDArray[Any], name: str, source: Path | None) -> NDArray[np
             f"{name} has no valid pixel",
             where=source,
             expected="some depth above 0",
-            found="NaN or inf everywhere" if not np.isfinite(raw_z).any() else "0, NaN or inf only",
+            found="NaN or inf everywhere"
+            if not np.isfinite(raw_z).any()
+            else "no return (0, NaN, inf, or the largest number of an unsigned type) everywhere",
             fix="check that the depth image is the right file and that the sensor ran",
         )
     return valid
@@ -275,31 +341,3 @@ def _colour(rgb: ArrayLike, source: Path | None) -> NDArray[np.uint8]:
             fix="floats from 0 to 1: (rgb * 255).astype(np.uint8); points: pass them as xyz",
         )
     return colour
-
-
-def _masks(segmap: ArrayLike, source: Path | None) -> NDArray[np.int64]:
-    ids = np.asarray(segmap)
-    if ids.ndim == 3 and ids.shape[-1] == 1:
-        ids = ids[..., 0]
-    whole = ids.dtype.kind in "iub" or (
-        ids.dtype.kind == "f" and bool(np.isfinite(ids).all() and (ids == np.floor(ids)).all())
-    )
-    if ids.ndim != 2 or not whole or (ids.size and np.abs(ids.astype(np.float64)).max() >= 2**62):
-        raise FrameError(
-            "segmap is no map of object ids",
-            where=source,
-            expected="(H, W) whole numbers, 0 = background",
-            found=f"shape {ids.shape}, dtype {ids.dtype}",
-            fix=advice("segmap", ids),
-        )
-    ids = ids.astype(np.int64)
-    objects = len(np.unique(ids))
-    if objects > MAX_OBJECTS:
-        raise FrameError(
-            "segmap holds too many objects",
-            where=source,
-            expected=f"at most {MAX_OBJECTS} different ids",
-            found=f"{objects}",
-            fix="check that it is the map of object ids, and not depth or colour",
-        )
-    return ids

@@ -14,6 +14,7 @@ from brrp_cli.errors import FrameError
 from brrp_cli.spoken import counted
 
 BACKGROUND = 0
+ONE_CAMERA = "colour, depth and masks must come from one camera at one resolution"
 
 
 @dataclass(frozen=True)
@@ -74,7 +75,7 @@ class Frame:
                     where=self.source,
                     expected=shape,
                     found=value.shape,
-                    fix="colour, depth and masks must come from one camera at one resolution",
+                    fix=ONE_CAMERA,
                 )
         for name in ("rgb", "points", "segmap", "K", "T_world_cam", "aside"):
             value = getattr(self, name)

@@ -16,6 +16,11 @@ _WHAT = {
 }
 
 
+# How single masks become one map of ids.
+JOIN_MASKS = (
+    "join single masks (n, H, W): ids = np.zeros(masks.shape[1:], np.uint16);"
+    " for i, mask in enumerate(masks, 1): ids[mask > 0] = i"
+)
 FEW = 64  # different values: depth of a table has more
 
 
@@ -37,6 +42,8 @@ def advice(name: str, array: NDArray[Any]) -> str | None:
     if name == "K" and array.size == 9:
         return "reshape it to (3, 3)"
     right = looks_like(array)
+    if name == "segmap" and array.ndim == 3 and right is None:
+        return JOIN_MASKS
     if right is None or right == name:
         return None
     return f"it looks like {_WHAT[right]}: pass it as {right}, and check that none are swapped"

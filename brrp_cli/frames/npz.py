@@ -21,7 +21,13 @@ ACCEPTED = frozenset(
 _NEEDED = "depth and K, or xyz; segmap or seg; optional: rgb, T_world_cam, left_out, corrected"
 
 
-def load_frame(path: str | Path, *, depth_scale: float | None = None, masks: bool = True) -> Frame:
+def load_frame(
+    path: str | Path,
+    *,
+    depth_scale: float | None = None,
+    masks: bool = True,
+    background_told: bool = False,
+) -> Frame:
     """Read a frame file.
 
     Keys: `depth` (H, W) and `K` (3, 3), or `xyz` (H, W, 3); `segmap` or `seg` (H, W); `rgb`
@@ -31,6 +37,7 @@ def load_frame(path: str | Path, *, depth_scale: float | None = None, masks: boo
 
     depth_scale : raw depth x depth_scale = metres
     masks : whether the file must have masks with an object in them
+    background_told : as in `make_frame`
 
     Errors: FrameError if the file is missing, damaged, too large, lacks a key or fails a check.
     """
@@ -62,6 +69,7 @@ def load_frame(path: str | Path, *, depth_scale: float | None = None, masks: boo
         T_world_cam=arrays.get("T_world_cam"),
         depth_scale=depth_scale,
         source=path,
+        background_told=background_told,
     )
     if "left_out" in arrays and has_masks:
         corrected = _corrected(arrays.get("corrected"), frame)

@@ -14,9 +14,16 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from brrp_cli.errors import FrameError
+from brrp_cli.files import exists
 from brrp_cli.frames.arrays import check_file, read_npy
 from brrp_cli.frames.build import MAX_PIXELS
+from brrp_cli.frames.misplaced import JOIN_MASKS
 
+# What holds masks, but not as one map of ids.
+_OTHER_MASKS = {
+    ".json": "JSON, such as COCO's annotations",
+    ".npz": "an .npz file of several arrays",
+}
 # Pillow's modes of one number a pixel that is wide enough for depth.
 _WIDE = ("I;16", "I;16B", "I;16L", "I;16N", "I", "F")
 
@@ -72,7 +79,24 @@ def _open(path: Path, mode: str | None) -> tuple[NDArray[Any], str]:
 
 def read_colour(path: Path) -> NDArray[np.uint8]:
     """(H, W, 3) uint8 of an image file. Errors: FrameError."""
-    return _open(path, "RGB")[0].astype(np.uint8)
+    check_file(path)
+    return decode_colour(path)
+
+
+def decode_colour(source: Path | BytesIO) -> NDArray[np.uint8]:
+    """(H, W, 3) uint8 of an image. Errors: FrameError, also for one wide number a pixel, of which
+    nobody tells where it is white: Pillow would make white of all above 255."""
+    colour, mode = decode(source, "RGB")
+    if mode in _WIDE:
+        raise FrameError(
+            "The colour image has one wide number a pixel",
+            where=source if isinstance(source, Path) else None,
+            expected="8 bits a channel, colour or grey",
+            found=f"Pillow mode {mode}",
+            fix="scale it to 0 to 255 and save it as an 8-bit image; if it is depth, pass it as"
+            " such",
+        )
+    return colour.astype(np.uint8)
 
 
 def read_depth(path: Path) -> NDArray[Any]:
@@ -95,9 +119,20 @@ def read_depth(path: Path) -> NDArray[Any]:
 
 
 def read_masks(path: Path) -> NDArray[Any]:
-    """(H, W) object ids of an .npy file or an image of one number (or palette index) a pixel."""
+    """(H, W) object ids of an .npy file or an image of one number (or palette index) a pixel.
+
+    Errors: FrameError, also for single masks, which are to be joined.
+    """
+    if exists(path) and path.is_dir():
+        raise _no_map(path, "a folder")
+    check_file(path)
+    if path.suffix.lower() in _OTHER_MASKS:
+        raise _no_map(path, _OTHER_MASKS[path.suffix.lower()])
     if path.suffix == ".npy":
-        return read_npy(path)
+        ids = read_npy(path)
+        if ids.ndim != 2 and not (ids.ndim == 3 and ids.shape[-1] == 1):
+            raise _no_map(path, f"shape {ids.shape}")
+        return ids
     if path.suffix.lower() in (".jpg", ".jpeg"):
         raise FrameError(
             "The mask image is a JPEG, which does not keep ids",
@@ -115,3 +150,13 @@ def read_masks(path: Path) -> NDArray[Any]:
             fix="save the ids as an 8-bit or 16-bit grey PNG, or as .npy",
         )
     return masks
+
+
+def _no_map(path: Path, found: str) -> FrameError:
+    return FrameError(
+        "The masks are not one map of ids",
+        where=path,
+        expected="one grey PNG or .npy (H, W) with the ids of all objects, 0 = background",
+        found=found,
+        fix=f"{JOIN_MASKS}; np.save('masks.npy', ids)",
+    )

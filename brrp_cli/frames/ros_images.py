@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from brrp_cli.errors import FrameError
 from brrp_cli.frames.build import make_frame
 from brrp_cli.frames.frame import Frame
-from brrp_cli.frames.pixels import decode
+from brrp_cli.frames.pixels import decode, decode_colour
 
 # encoding -> (type, channels, the channels that are red, green and blue)
 _COLOUR: dict[str, tuple[int, tuple[int, int, int]]] = {
@@ -40,7 +40,7 @@ def is_depth(message: Any) -> bool:
 def colour_of(message: Any) -> NDArray[np.uint8]:
     """(H, W, 3) uint8 RGB of an Image or CompressedImage message. Errors: FrameError."""
     if not hasattr(message, "encoding"):
-        return decode(io.BytesIO(bytes(message.data)), "RGB")[0].astype(np.uint8)
+        return decode_colour(io.BytesIO(bytes(message.data)))
     if message.encoding not in _COLOUR:
         raise _unknown(message.encoding, ", ".join(_COLOUR))
     channels, order = _COLOUR[message.encoding]

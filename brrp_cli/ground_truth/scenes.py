@@ -72,7 +72,9 @@ class Scene:
 
     def read(self, path: Path) -> Frame:
         """The frame of one of `views`. Errors: FrameError."""
-        return read_published(path) if path.is_dir() else load_frame(path)
+        if path.is_dir():
+            return read_published(path)
+        return load_frame(path, background_told=True)  # the true objects' ids tell it
 
     def _keep_known_ids(self, frame: Frame) -> Frame:
         known = [o.id for o in self.objects]

@@ -82,12 +82,16 @@ ZOO = {
     "mask fractions": ({"segmap": np.full(SHAPE, 0.5)}, "no map of object ids"),
     "mask NaN": ({"segmap": np.full(SHAPE, np.nan)}, "no map of object ids"),
     "mask too big": ({"segmap": np.full(SHAPE, 2**63, np.uint64)}, "no map of object ids"),
+    "masks apart": ({"segmap": np.ones((5, 6, 8), bool)}, r"\(5, 6, 8\)(.|\n)*join single masks"),
     "rgb float": ({"rgb": np.zeros((*SHAPE, 3))}, "rgb has the wrong type"),
     "rgb grey": ({"rgb": np.zeros(SHAPE, np.uint8)}, "rgb has the wrong shape"),
     "rgb size": ({"rgb": np.zeros((12, 16, 3), np.uint8)}, "rgb has the wrong shape"),
     "pose shape": ({"T_world_cam": np.eye(3)}, "no rigid transform"),
     "pose shear": ({"T_world_cam": SHEAR}, "no rigid transform"),
-    "pose mirror": ({"T_world_cam": np.diag([1.0, 1, -1, 1])}, "no rigid transform"),
+    "pose mirror": (
+        {"T_world_cam": np.diag([1.0, 1, -1, 1])},
+        "no rigid transform(.|\n)*left-handed(.|\n)*negate",
+    ),
     "pose NaN": ({"T_world_cam": np.full((4, 4), np.nan)}, "no rigid transform"),
 }
 
@@ -159,6 +163,78 @@ def test_masks_of_any_dtype_keep_their_ids(dtype):
 def test_negative_ids_are_objects():
     mask = np.where(good()["segmap"] == 7, -4, 0)
     assert make_frame(**good(segmap=mask)).object_ids == [-4]
+
+
+@pytest.mark.parametrize(
+    ("ids", "message"),
+    [
+        ({"object": 7, "rest": -1}, r"mark with -1 what is no object(.|\n)*-1 in 91\.7 % of the"),
+        ({"object": 7, "rest": 0, "corner": -1}, r"mark with -1(.|\n)*segmap == -1\] = 0"),
+        ({"object": 7, "rest": -2}, "mark with -2 what is no object"),
+        ({"object": 7, "rest": 255}, r"no background(.|\n)*255 in 91\.7 %(.|\n)*set what is no"),
+        ({"object": -4, "rest": 2}, "no background"),
+    ],
+)
+def test_a_background_that_is_not_0_is_told(ids, message):
+    mask = np.where(good()["segmap"] == 7, ids["object"], ids["rest"])
+    mask[0, 0] = ids.get("corner", ids["rest"])
+    with pytest.raises(FrameError, match=message):
+        make_frame(**good(segmap=mask))
+
+
+def test_an_object_that_looks_like_the_background_is_noted(caplog):
+    near = np.full(SHAPE, 7)
+    near[0, 0] = 0  # before a near camera an object fills the image
+    for mask in (near, np.full(SHAPE, 7)):
+        caplog.clear()
+        assert make_frame(**good(segmap=mask)).object_ids == [7]
+        assert "object 7 covers" in caplog.text and "set its pixels to 0" in caplog.text
+    caplog.clear()
+    near[:, 0] = 0
+    make_frame(**good(segmap=near))
+    make_frame(**good(segmap=None))
+    assert not caplog.text, "it leaves one border free, and a frame without masks has no object"
+
+
+@pytest.mark.parametrize("name", ["rgb", "segmap"])
+@pytest.mark.parametrize("geometry", ["depth", "xyz"])
+def test_another_size_than_depths_is_told_before_the_intrinsics_are_judged(name, geometry):
+    half = {"depth": np.full((3, 4), 0.8)} if geometry == "depth" else {"xyz": POINTS[:3, :4]}
+    given = good(**{"depth": None, **half})
+    given["segmap" if name == "rgb" else "rgb"] = None
+    with pytest.raises(FrameError, match=f"{name} has the wrong shape") as error:
+        make_frame(**given)
+    assert "8 x 6" in error.value.found and "4 x 3" in error.value.expected
+    assert "one resolution" in error.value.fix
+
+
+def test_errors_of_intrinsics_and_units_say_what_to_do():
+    for changes in (
+        {"K": None},
+        {"K": matrix(a00=-60)},
+        {"K": matrix(a02=np.nan)},
+        {"K": matrix(a01=5)},
+        {"K": np.eye(2)},
+        {"depth_scale": -1.0},
+    ):
+        with pytest.raises(FrameError) as error:
+            make_frame(**good(**changes))
+        assert error.value.fix, changes
+
+
+@pytest.mark.parametrize("dtype", [np.uint16, np.uint32])
+def test_the_largest_number_of_an_unsigned_type_is_no_return(dtype, caplog):
+    caplog.set_level(logging.INFO)
+    depth = np.full(SHAPE, 800, dtype)
+    make_frame(**good(depth=depth))
+    assert "no return" not in caplog.text
+    depth[:2, :2] = np.iinfo(dtype).max
+    frame = make_frame(**good(depth=depth))
+    assert not frame.valid[:2, :2].any() and frame.valid.sum() == 44
+    assert f"4 pixels with {np.iinfo(dtype).max}" in caplog.text and "no return" in caplog.text
+    assert depth[0, 0] == np.iinfo(dtype).max, "the caller's array stays"
+    with pytest.raises(FrameError, match="no valid pixel"):
+        make_frame(**good(depth=np.full(SHAPE, np.iinfo(dtype).max, dtype)))
 
 
 @pytest.mark.parametrize(

@@ -201,7 +201,17 @@ def test_intrinsics_of_every_maker_are_the_same_matrix(tmp_path, kind):
 def test_wrong_intrinsics_are_told(tmp_path, text, message):
     path = tmp_path / "k.json"
     path.write_text(text)
-    with pytest.raises(FrameError, match=message):
+    with pytest.raises(FrameError, match=message) as error:
+        read_intrinsics(path)
+    assert "fx" in error.value.fix
+
+
+def test_intrinsics_that_an_editor_marked_as_utf_8_are_read(tmp_path):
+    path = tmp_path / "k.json"
+    path.write_text(json.dumps(KINDS["cx"]), encoding="utf-8-sig")
+    assert np.array_equal(read_intrinsics(path).K, K)
+    path.write_text(json.dumps(KINDS["cx"]), encoding="utf-16")
+    with pytest.raises(FrameError, match=r"no JSON(.|\n)*no UTF-8 text"):
         read_intrinsics(path)
 
 
@@ -282,6 +292,56 @@ def test_pictures_of_depth_and_of_masks_are_refused(images):
         read_images(**{**images, "depth": images["color"]})
     with pytest.raises(FrameError, match="colours, not ids"):
         read_images(**{**images, "masks": images["color"]})
+
+
+@pytest.mark.parametrize("wide", [np.uint16, np.int32, np.float32])
+def test_a_colour_image_of_wide_numbers_is_refused(images, tmp_path, wide):
+    grey = np.linspace(0, 4000, 160 * 120).reshape(120, 160)
+    path = tmp_path / "infrared.tiff"
+    Image.fromarray(grey.astype(wide)).save(path)
+    with pytest.raises(FrameError, match=r"one wide number a pixel(.|\n)*scale it to 0 to 255"):
+        read_images(**{**images, "color": path})
+    Image.fromarray((grey / 4000 * 255).astype(np.uint8)).save(path)
+    assert read_images(**{**images, "color": path}).rgb.std() > 60
+
+
+STACK = np.zeros((5, 120, 160), bool)
+
+
+def other_masks(folder, kind):
+    """Masks that are no one map of ids, as people have them."""
+    path = folder / f"masks{kind}"
+    if kind == "":
+        path.mkdir()
+    elif kind == ".npy":
+        np.save(path, STACK)
+    elif kind == ".npz":
+        np.savez(path, masks=STACK)
+    else:
+        path.write_text('{"annotations": []}')
+    return path
+
+
+@pytest.mark.parametrize(
+    ("kind", "found"),
+    [("", "a folder"), (".npy", r"\(5, 120, 160\)"), (".npz", "npz file"), (".json", "COCO")],
+)
+def test_single_masks_are_to_be_joined(images, tmp_path, kind, found):
+    with pytest.raises(FrameError, match=f"one grey PNG or .npy(.|\n)*{found}(.|\n)*join single"):
+        read_images(**{**images, "masks": other_masks(tmp_path, kind)})
+
+
+def test_the_advice_for_single_masks_gives_masks_that_are_read(images, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    masks = STACK.copy()
+    masks[0, 40:60, 40:60] = masks[4, 70:90, 70:90] = True
+    np.save(tmp_path / "stack.npy", masks)
+    with pytest.raises(FrameError) as error:
+        read_images(**{**images, "masks": tmp_path / "stack.npy"})
+    advice = error.value.fix.partition(": ")[2]
+    first, loop, save = advice.split("; ")
+    exec(f"{first}\n{loop}\n{save}", {"np": np, "masks": masks})
+    assert read_images(**{**images, "masks": tmp_path / "masks.npy"}).object_ids == [1, 5]
 
 
 @pytest.mark.parametrize("name", ["color", "depth", "masks"])

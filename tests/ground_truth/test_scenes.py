@@ -6,6 +6,7 @@ import trimesh
 from PIL import Image
 
 from brrp_cli.errors import FrameError, SceneError
+from brrp_cli.frames.npz import load_frame
 from brrp_cli.geometry import transform_points
 from brrp_cli.ground_truth.scenes import find_scenes, true_mesh, true_mesh_in_camera
 
@@ -99,6 +100,16 @@ def test_both_layouts_give_the_same_world_points_and_objects_only(tmp_path):
         assert seen[:, 2] == pytest.approx(0, abs=1e-5)
         assert seen[:, 0].min() == pytest.approx((10 - 16) / 24, abs=1e-5)
         assert seen[:, 1].max() == pytest.approx((12 - 10) / 24, abs=1e-5)
+
+
+def test_true_ids_tell_the_background_whatever_the_masks_mark_it_with(tmp_path):
+    write_npz(tmp_path / "a.npz", [entry()], segmap=mask())
+    write_npz(tmp_path / "b.npz", [entry()], segmap=np.where(mask() == 3, 3, 7))
+    for scene in find_scenes(tmp_path):
+        frame = scene.view(0)
+        assert frame.object_ids == [3] and (frame.segmap == 3).sum() == 24
+        with pytest.raises(FrameError, match=r"no object|no background"):
+            load_frame(scene.folder)
 
 
 def test_true_mesh_is_scaled_turned_and_moved(tmp_path, data_root):
