@@ -1,9 +1,9 @@
-"""How a message names an option, as the user typed it or would have, how it counts, and what it
-calls an object that is none of the prior's."""
+"""How a message names an option, as the user typed it or would have, how it counts and lists, and
+what it calls an object that is none of the prior's."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
 
@@ -34,6 +34,12 @@ def option(name: str, value: object = None) -> str:
 def either(command: str, python: str) -> str:
     """Advice in the words of the command line where it was used, else in Python's."""
     return command if _TYPED.get() else python
+
+
+def few(names: Sequence[str]) -> str:
+    """The first of them, and how many more there are: `a, b, c, d, e and 2 more`."""
+    more = f" and {len(names) - 5} more" if len(names) > 5 else ""
+    return ", ".join(names[:5]) + more
 
 
 def counted(number: int, noun: str) -> str:

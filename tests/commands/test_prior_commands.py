@@ -90,3 +90,19 @@ def test_a_folder_that_cannot_be_written_is_one_message(tmp_path: Path) -> None:
     result = brrp("build-prior", tmp_path, "-o", tmp_path / "file" / "prior")
     assert result.exit_code == 1
     assert "Cannot write" in result.stderr
+
+
+def test_meshes_and_descriptions_that_were_left_out_are_noted(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    (tmp_path / "nest" / "sub").mkdir(parents=True)
+    trimesh.creation.box((0.1, 0.1, 0.1)).export(tmp_path / "nest" / "box.stl")
+    trimesh.creation.box((0.1, 0.1, 0.1)).export(tmp_path / "nest" / "sub" / "other.stl")
+    (tmp_path / "d.csv").write_text("boxx,a box\n")
+    result = brrp(
+        *("build-prior", tmp_path / "nest", "-o", tmp_path / "prior", "--samples", 100),
+        *("--workers", 1, "--descriptions", tmp_path / "d.csv"),
+    )
+    assert result.exit_code == 0, result.output
+    assert "meshes in its folders are left out: sub" in caplog.text
+    assert "none of the meshes: boxx (is boxx box?)" in caplog.text

@@ -14,7 +14,7 @@ from brrp_cli.executors.executor import Executor, open_executor
 from brrp_cli.files import atomic_path, sha256_file
 from brrp_cli.prior.appearance_file import Rows, is_whole, sidecar_file, write_sidecar
 from brrp_cli.prior.appearance_index import open_appearance_index
-from brrp_cli.prior.build.descriptions import describe, read_descriptions
+from brrp_cli.prior.build.descriptions import phrases_of
 from brrp_cli.prior.build.find_meshes import MeshSource, find_all_meshes
 from brrp_cli.prior.build.lock import only_builder
 from brrp_cli.prior.build.make_object import make_object
@@ -79,8 +79,7 @@ def build_prior(
     table = (parameters or BuildParameters()).as_dict()
     places = [meshes] if isinstance(meshes, Path) else list(meshes)
     sources = {source.name: source for source in find_all_meshes(places)}
-    given = read_descriptions(descriptions) if descriptions else {}
-    phrases = describe(sources, given)
+    phrases = phrases_of(sources, descriptions)
     with sole_builder(out):
         before = previous_manifest(out)
         if before is not None and not overwrite:

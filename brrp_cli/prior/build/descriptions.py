@@ -3,14 +3,19 @@
 from __future__ import annotations
 
 import csv
+import logging
 import re
 import tomllib
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from pathlib import Path
 from typing import Any
 
 from brrp_cli.errors import PriorError
-from brrp_cli.files import parse_json
+from brrp_cli.files import parse_json, read_text, trouble_of
+from brrp_cli.similar_names import most_similar_name
+from brrp_cli.spoken import few
+
+log = logging.getLogger(__name__)
 
 YCB_MANIFEST = Path(__file__).parents[2] / "data_manifests" / "ycb.toml"
 
@@ -34,7 +39,7 @@ def read_descriptions(path: Path) -> dict[str, str]:
     name and phrase, without a heading. Errors: PriorError.
     """
     try:
-        text = path.read_text(encoding="utf-8")
+        text = read_text(path)
         table: Any
         if path.suffix.lower() == ".toml":
             table = tomllib.loads(text)
@@ -47,7 +52,13 @@ def read_descriptions(path: Path) -> dict[str, str]:
                 "Descriptions in an unknown format", where=path, expected=".toml, .json or .csv"
             )
     except (OSError, ValueError, csv.Error) as error:
-        raise PriorError("Cannot read the descriptions", where=path, found=error) from error
+        raise PriorError(
+            "Cannot read the descriptions",
+            where=path,
+            expected='TOML: cup = "a red cup"; JSON: {"cup": "a red cup"}; CSV: cup,a red cup',
+            found=trouble_of(error),
+            fix="check the path" if isinstance(error, OSError) else "write the file in such a form",
+        ) from error
     if isinstance(table, dict) and isinstance(table.get("descriptions"), dict):
         table = table["descriptions"]
     if not isinstance(table, dict):
@@ -55,7 +66,8 @@ def read_descriptions(path: Path) -> dict[str, str]:
             "The descriptions are no table",
             where=path,
             expected="name -> phrase",
-            found=type(table),
+            found="a list" if isinstance(table, list) else repr(table),
+            fix='write a table: {"cup": "a red cup"}',
         )
     for name, phrase in table.items():
         if not isinstance(phrase, str) or not phrase.strip():
@@ -77,6 +89,22 @@ def _read_csv(text: str) -> dict[str, str]:
             raise ValueError(f"row {number} has {len(row)} columns, expected: name,phrase")
         table[row[0].strip()] = row[1]
     return table
+
+
+def phrases_of(names: Collection[str], descriptions: Path | None) -> dict[str, str]:
+    """A phrase for each name of a mesh, first of all from the file; names in it that no mesh has
+    are noted. Errors: PriorError."""
+    given = read_descriptions(descriptions) if descriptions else {}
+    strangers = [name for name in given if name not in names]
+    if strangers:
+        meant = most_similar_name(strangers[0], names)
+        log.info(
+            "%s describes what is none of the meshes: %s%s",
+            descriptions,
+            few(strangers),
+            f" (is {strangers[0]} {meant}?)" if meant else "",
+        )
+    return describe(names, given)
 
 
 def describe(names: Iterable[str], given: dict[str, str]) -> dict[str, str]:

@@ -19,7 +19,7 @@ from brrp_cli.prior.build.build import (
     previous_manifest,
     sole_builder,
 )
-from brrp_cli.prior.build.descriptions import describe, read_descriptions
+from brrp_cli.prior.build.descriptions import phrases_of
 from brrp_cli.prior.build.find_meshes import find_all_meshes
 from brrp_cli.prior.build.reuse import Finished, Reusable, unlisted_objects
 from brrp_cli.prior.manifest import FILE, Manifest, ObjectEntry, read_bytes, read_manifest
@@ -45,7 +45,7 @@ def add_objects(
     another mesh, unless `replace`; else those of build_prior.
     """
     sources = {source.name: source for source in find_all_meshes(meshes)}
-    phrases = describe(sources, read_descriptions(descriptions) if descriptions else {})
+    phrases = phrases_of(sources, descriptions)
     # No folder is made, and no lock, where there is no prior.
     read_bytes(prior)
     with sole_builder(prior):

@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
+import logging
+import os
 from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from brrp_cli.errors import MeshError
+from brrp_cli.files import exists
 from brrp_cli.prior.names import safe_name
+from brrp_cli.spoken import few
+
+log = logging.getLogger(__name__)
 
 SUFFIXES = (".obj", ".ply", ".stl", ".off", ".glb")
 
@@ -41,16 +47,17 @@ def find_meshes(folder: Path) -> list[MeshSource]:
     MeshError when there is none, or when two would have one name.
     """
     if not folder.is_dir():
-        raise MeshError("There is no such folder of meshes", where=folder)
+        raise _no_folder(folder)
     sources = []
     for entry in sorted(folder.iterdir()):
         if entry.name.startswith("."):
             continue
         if entry.is_dir():
-            inner = next((entry / p for p in OBJECT_FOLDERS if (entry / p).is_file()), None)
+            inner = _inner(entry)
             if inner is not None:
-                relative = inner.relative_to(folder).as_posix()
-                sources.append(MeshSource(safe_name(entry.name), inner, relative))
+                sources.append(
+                    MeshSource(safe_name(entry.name), entry / inner, f"{entry.name}/{inner}")
+                )
         elif entry.suffix.lower() in SUFFIXES:
             sources.append(MeshSource(safe_name(entry.stem), entry, entry.name))
     if not sources:
@@ -59,6 +66,9 @@ def find_meshes(folder: Path) -> list[MeshSource]:
             where=folder,
             expected=f"files {' '.join(SUFFIXES)}, or folders NAME/{OBJECT_FOLDERS[0]}",
             found=_what_is_there(folder),
+            fix=f"name the folder that holds them: {folder / nested[0]}"
+            if (nested := _folders_of_meshes(folder))
+            else "export the meshes in one of these formats, or name the folder that holds them",
         )
     _refuse_collisions(sources, folder)
     return sorted(sources, key=lambda source: source.name)
@@ -71,6 +81,8 @@ def find_all_meshes(places: Sequence[Path]) -> list[MeshSource]:
     as 025_mug/ of the YCB archive. Errors: those of find_meshes.
     """
     sources = [source for place in places for source in _at(place)]
+    for place in places:
+        _note_passed_over(place, places)
     _refuse_collisions(sources, " and ".join(map(str, places)))
     return sorted(sources, key=lambda source: source.name)
 
@@ -78,17 +90,63 @@ def find_all_meshes(places: Sequence[Path]) -> list[MeshSource]:
 def _at(place: Path) -> list[MeshSource]:
     if place.is_file() and place.suffix.lower() in SUFFIXES:
         return [MeshSource(safe_name(place.stem), place, place.name)]
-    inner = next((p for p in OBJECT_FOLDERS if (place / p).is_file()), None)
+    inner = _inner(place)
     if inner is None:
         return find_meshes(place)
     name = place.resolve().name
     return [MeshSource(safe_name(name), place / inner, f"{name}/{inner}")]
 
 
+def _inner(folder: Path) -> str | None:
+    """Where the mesh of an object lies whose folder this is; None for any other folder."""
+    return next((p for p in OBJECT_FOLDERS if (folder / p).is_file()), None)
+
+
+def _no_folder(path: Path) -> MeshError:
+    if exists(path):
+        return MeshError(
+            "The file is no mesh of a known format",
+            where=path,
+            expected=f"a folder of meshes, or a file {' '.join(SUFFIXES)}",
+            found=path.suffix or "a name without an ending",
+            fix="export the mesh in one of these formats",
+        )
+    return MeshError("There is no such folder of meshes", where=path, fix="check the path")
+
+
+def _folders_of_meshes(folder: Path) -> list[str]:
+    """Names of the folders in `folder` that hold meshes, somewhere, but are no object's."""
+    return [
+        entry.name
+        for entry in sorted(folder.iterdir())
+        if entry.is_dir()
+        and not entry.name.startswith(".")
+        and _inner(entry) is None
+        and any(name.lower().endswith(SUFFIXES) for _, _, names in os.walk(entry) for name in names)
+    ]
+
+
+def _note_passed_over(place: Path, places: Sequence[Path]) -> None:
+    """Meshes deeper in a folder may have been meant, too."""
+    if not place.is_dir() or _inner(place) is not None:
+        return
+    given = [each.resolve() for each in places]
+    passed = [
+        name
+        for name in _folders_of_meshes(place)
+        if not any(each.is_relative_to((place / name).resolve()) for each in given)
+    ]
+    if passed:
+        log.warning(
+            "%s: meshes in its folders are left out: %s. Name a folder to take its meshes, too",
+            place,
+            few(passed),
+        )
+
+
 def _what_is_there(folder: Path) -> str:
     names = sorted(entry.name for entry in folder.iterdir())
-    more = f" and {len(names) - 5} more" if len(names) > 5 else ""
-    return (", ".join(names[:5]) + more) if names else "an empty folder"
+    return few(names) if names else "an empty folder"
 
 
 def _refuse_collisions(sources: list[MeshSource], where: object) -> None:

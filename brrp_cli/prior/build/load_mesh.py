@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from brrp_cli.errors import MeshError
+from brrp_cli.files import trouble_of
 from brrp_cli.prior.parameters import UNITS
 
 if TYPE_CHECKING:
@@ -30,7 +31,14 @@ def load_mesh(path: Path, units: str = "m") -> trimesh.Trimesh:
         loaded = scene.to_mesh() if scene.geometry else trimesh.Trimesh()
     except Exception as error:
         # trimesh's readers raise whatever the damaged file made them stumble over.
-        raise MeshError("The mesh file cannot be read", where=path, found=repr(error)) from error
+        known = isinstance(error, (OSError, ImportError, MemoryError))
+        raise MeshError(
+            "The mesh file cannot be read",
+            where=path,
+            expected=f"a whole {path.suffix[1:].upper()} file",
+            found=trouble_of(error) if known else "bytes that are no such mesh",
+            fix="it is damaged, cut short or not what its name says: export it again",
+        ) from error
     vertices = np.asarray(loaded.vertices, dtype=np.float64)
     faces = np.asarray(loaded.faces, dtype=np.int64)
     if len(faces) == 0:
@@ -68,6 +76,7 @@ def _check_size(extents: np.ndarray, path: Path, units: str) -> None:
             where=path,
             expected=f"at least {MIN_EXTENT:g} m in one direction",
             found=f"{size}, read with --units {units}",
+            fix="export it larger" if units == "m" else "if the file is in metres, pass --units m",
         )
 
 

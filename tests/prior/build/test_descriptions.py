@@ -1,3 +1,4 @@
+import logging
 from pathlib import Path
 
 import pytest
@@ -7,6 +8,7 @@ from brrp_cli.prior.build.descriptions import (
     YCB_MANIFEST,
     describe,
     phrase_from_name,
+    phrases_of,
     read_descriptions,
 )
 
@@ -69,3 +71,30 @@ def test_bad_files_are_refused(tmp_path: Path, file: str, text: str, told: str) 
     (tmp_path / file).write_text(text)
     with pytest.raises(PriorError, match=told):
         read_descriptions(tmp_path / file)
+
+
+def test_a_file_that_is_missing_or_no_text_is_told_in_words(tmp_path: Path) -> None:
+    with pytest.raises(PriorError, match="Cannot read") as caught:
+        read_descriptions(tmp_path / "none.toml")
+    assert caught.value.found == "No such file or directory" and caught.value.fix
+    (tmp_path / "d.csv").write_text("cup,a red cup", encoding="utf-16")
+    with pytest.raises(PriorError, match="no UTF-8 text"):
+        read_descriptions(tmp_path / "d.csv")
+    (tmp_path / "d.csv").write_text("cup,a red cup", encoding="utf-8-sig")
+    assert read_descriptions(tmp_path / "d.csv") == {"cup": "a red cup"}
+
+
+def test_descriptions_of_no_mesh_are_noted(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    caplog.set_level(logging.INFO)
+    (tmp_path / "d.csv").write_text("red_cupp,a red cup\nbowl,a bowl\n")
+    assert phrases_of(["red_cup", "bowl"], tmp_path / "d.csv") == {
+        "red_cup": "a red cup",
+        "bowl": "a bowl",
+    }
+    assert "none of the meshes: red_cupp (is red_cupp red_cup?)" in caplog.text
+    caplog.clear()
+    phrases_of(["red_cupp", "bowl", "can"], tmp_path / "d.csv")
+    phrases_of(["can"], None)
+    assert not caplog.text

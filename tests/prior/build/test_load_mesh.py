@@ -84,6 +84,21 @@ def test_bad_files_are_refused_with_a_reason(tmp_path: Path, text: str, told: st
     assert caught.value.where == path
 
 
+@pytest.mark.parametrize("data", [b"glTF" + bytes(range(256)), b"{", b""])
+def test_why_a_glb_cannot_be_read_is_told_in_words(tmp_path: Path, data: bytes) -> None:
+    (tmp_path / "bad.glb").write_bytes(data)
+    with pytest.raises(MeshError, match="cannot be read") as caught:
+        load_mesh(tmp_path / "bad.glb")
+    assert caught.value.found == "bytes that are no such mesh"
+    assert caught.value.expected == "a whole GLB file" and "export it again" in caught.value.fix
+
+
+def test_what_is_too_small_by_its_unit_is_refused_with_the_option(tmp_path: Path) -> None:
+    trimesh.creation.box((0.05, 0.05, 0.05)).export(tmp_path / "box.stl")
+    with pytest.raises(MeshError, match=r"too small(.|\n)*pass --units m$"):
+        load_mesh(tmp_path / "box.stl", "mm")
+
+
 def test_flat_in_a_tilted_plane_is_refused(tmp_path: Path) -> None:
     sheet = trimesh.creation.box((0.1, 0.1, 0.0))
     sheet.apply_transform(trimesh.transformations.rotation_matrix(0.7, (1, 2, 3)))
