@@ -103,6 +103,7 @@ class AppearanceRetriever:
                 where=frame.source,
                 expected=", ".join(map(str, frame.object_ids)) or "a mask with objects",
                 found=object_id,
+                fix="take an id of frame.object_ids",
             )
         return self._answers[object_id]
 

@@ -17,10 +17,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brrp_cli.errors import RetrievalError
-from brrp_cli.files import parse_json
+from brrp_cli.files import parse_json, read_text, trouble_of
 from brrp_cli.frames.frame import Frame
 
 EXPECTED = 'JSON {"1": {"NAME": 0.9}, "2": {}}, or CSV with the columns object, name, probability'
+_COLUMNS = ("object", "name", "probability")
 # Numbers that were rounded for a file may sum to a little more than 1.
 ROUNDING = 1e-3
 
@@ -53,24 +54,52 @@ class TableRetriever:
 
 def _read(path: Path) -> dict[int, dict[str, Any]]:
     try:
-        text = path.read_text(encoding="utf-8")
-        table = _from_csv(text) if path.suffix.lower() == ".csv" else parse_json(text)
-        return {int(object_id): dict(given) for object_id, given in table.items()}
-    except (OSError, ValueError, KeyError, TypeError, AttributeError, csv.Error) as error:
+        text = read_text(path)
+        return _rows_of(_from_csv(text) if path.suffix.lower() == ".csv" else parse_json(text))
+    except (OSError, ValueError, csv.Error) as error:
         raise RetrievalError(
             "The table of probabilities cannot be read",
             where=path,
             expected=EXPECTED,
-            found=f"{type(error).__name__}: {error}",
+            found=trouble_of(error),
+            fix="write the file in one of these forms",
         ) from error
 
 
+def _rows_of(table: Any) -> dict[int, dict[str, Any]]:
+    """Id -> name -> probability of what the file holds. Errors: ValueError, in words."""
+    if not isinstance(table, dict):
+        raise ValueError("no JSON object of ids: it begins with no {")
+    rows = {}
+    for object_id, given in table.items():
+        try:
+            number = int(object_id)
+        except ValueError:
+            raise ValueError(f"{object_id!r} in place of an object's id, a whole number") from None
+        if not isinstance(given, dict):
+            raise ValueError(f'object {number}: {given!r} in place of {{"NAME": probability}}')
+        rows[number] = given
+    return rows
+
+
 def _from_csv(text: str) -> dict[str, dict[str, float]]:
+    """Errors: ValueError, in words; csv.Error."""
+    rows = csv.DictReader(text.splitlines())
+    columns = rows.fieldnames or []
+    lacking = [name for name in _COLUMNS if name not in columns]
+    if lacking:
+        raise ValueError(f"no column {lacking[0]}; the columns are {', '.join(columns) or 'none'}")
     table: dict[str, dict[str, float]] = {}
-    for row in csv.DictReader(text.splitlines()):
+    for row in rows:
         given = table.setdefault(row["object"], {})
         if row["name"]:
-            given[row["name"]] = float(row["probability"])
+            try:
+                given[row["name"]] = float(row["probability"])
+            except (TypeError, ValueError):
+                raise ValueError(
+                    f"line {rows.line_num}: {row['probability'] or 'nothing'} in place of a"
+                    " probability"
+                ) from None
     return table
 
 

@@ -99,4 +99,6 @@ def _known(frame: Frame, ids: Sequence[int]) -> None:
             where=frame.source,
             expected=", ".join(map(str, frame.object_ids)) or "masks with objects",
             found=", ".join(map(str, strangers)),
+            fix="take ids of the picture NAME.masks.png, which brrp segment writes; splits come"
+            " first, then merges, then drops",
         )

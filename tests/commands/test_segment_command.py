@@ -113,6 +113,7 @@ def test_a_frame_without_masks_gets_some(saved, tmp_path):
     [
         (["--merge", "4,5"], 1, "no such object"),
         (["--drop", "5"], 1, "no such object"),
+        (["--drop", "5"], 1, "take ids of the picture"),
         (["--merge", "4"], 2, "two ids"),
         (["--merge", "a,b"], 2, "whole numbers"),
         (["--split", "4:1"], 2, "two pieces"),

@@ -56,6 +56,35 @@ def test_what_cannot_be_used_is_told(tmp_path, text, message):
     assert str(path) in str(caught.value)
 
 
+@pytest.mark.parametrize(
+    ("file", "text", "words"),
+    [
+        ("p.json", None, "No such file"),
+        ("p.json", "[1]", "no JSON object of ids"),
+        ("p.json", '{"mug": {"cup": 1}}', "'mug' in place of an object's id, a whole number"),
+        ("p.json", '{"1": 0.5}', 'object 1: 0.5 in place of {"NAME": probability}'),
+        ("p.csv", "id,name,probability\n1,cup,0.5\n", "no column object; the columns are id, name"),
+        ("p.csv", "", "no column object; the columns are none"),
+        ("p.csv", "object,name,probability\n1,cup,much\n", "line 2: much in place of a probab"),
+        ("p.csv", "object,name,probability\n1,cup\n", "line 2: nothing in place of a probab"),
+        ("p.csv", "object,name,probability\n,cup,1\n", "'' in place of an object's id"),
+    ],
+)
+def test_why_a_table_cannot_be_read_is_told_in_words(tmp_path, file, text, words):
+    path = tmp_path / file if text is None else write(tmp_path, file, text)
+    with pytest.raises(RetrievalError, match="cannot be read") as caught:
+        TableRetriever(path, NAMES)
+    assert words in caught.value.found and caught.value.fix
+    assert "Error" not in caught.value.found and "Errno" not in caught.value.found
+
+
+@pytest.mark.parametrize("file", ["p.json", "p.csv"])
+def test_a_table_that_an_editor_marked_as_utf_8_is_read(tmp_path, frame, file):
+    text = json.dumps(GIVEN) if file == "p.json" else "object,name,probability\n1,bowl,0.5\n"
+    (tmp_path / file).write_text(text, encoding="utf-8-sig")
+    assert TableRetriever(tmp_path / file, NAMES).probabilities(frame, 1)[1] == 0.5
+
+
 def test_an_object_that_is_not_named_is_told(tmp_path, frame):
     retriever = TableRetriever(write(tmp_path, "p.json", json.dumps(GIVEN)), NAMES)
     with pytest.raises(RetrievalError, match="does not name an object") as caught:

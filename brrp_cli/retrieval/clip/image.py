@@ -26,6 +26,7 @@ def object_crop(frame: Frame, object_id: int) -> NDArray[np.uint8]:
             where=frame.source,
             expected=", ".join(map(str, frame.object_ids)) or "a mask with objects",
             found=object_id,
+            fix="take an id of frame.object_ids",
         )
     return frame.rgb[rows.min() : rows.max() + 1, columns.min() : columns.max() + 1]
 
