@@ -23,6 +23,7 @@ from brrp_cli.config.registration import TrialConfig
 from brrp_cli.config.segmentation import SegmentConfig
 from brrp_cli.config.tracking import TrackConfig
 from brrp_cli.errors import FrameError
+from brrp_cli.frames.build import require_frame
 from brrp_cli.frames.frame import Frame
 from brrp_cli.mending.again import Again, Objects
 from brrp_cli.mending.mend import mend
@@ -107,8 +108,9 @@ class Reconstructor:
         """All objects of one frame; masks are made where it has none, which `seconds` tells, and
         those that brrp made, now or before, are mended by what is recognised.
 
-        Errors: BrrpError; FrameError if nothing stands on the table.
+        Errors: BrrpError; FrameError if nothing stands on the table, or for what is no frame.
         """
+        require_frame(frame)
         with one_image(self._retriever):
             result = self._reconstructed(frame)
         # Who asks for one frame only has no use for them.

@@ -115,8 +115,23 @@ def make_frame(
     )
 
 
+def require_frame(given: object) -> Frame:
+    """The frame itself. Errors: FrameError for anything else, such as the path of one."""
+    if isinstance(given, Frame):
+        return given
+    raise FrameError(
+        "That is no frame",
+        expected="a Frame",
+        found=f"{type(given).__name__} {given}"
+        if isinstance(given, str | Path)
+        else type(given).__name__,
+        fix='read a file with load_frame("frame.npz"), or check arrays with make_frame(...)',
+    )
+
+
 def require_objects(frame: Frame) -> Frame:
-    """The frame itself. Errors: FrameError if its mask has no object."""
+    """The frame itself. Errors: FrameError if its mask has no object, or if it is no frame."""
+    require_frame(frame)
     if not frame.object_ids:
         raise FrameError(
             "There is no object in the mask",

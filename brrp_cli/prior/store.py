@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import os
 from collections import OrderedDict, defaultdict
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
@@ -141,6 +142,13 @@ class Prior:
 
 def open_prior(path: str | Path) -> Prior:
     """Open the prior in a folder. Errors: PriorError."""
+    if not isinstance(path, (str, os.PathLike)):
+        raise PriorError(
+            "That is no path of a prior",
+            expected="the folder of a prior",
+            found=repr(path),
+            fix='open_prior("prior/"); brrp build-prior makes one',
+        )
     folder = Path(path)
     return Prior(folder, read_index(folder))
 

@@ -174,3 +174,11 @@ def test_another_methods_configuration_is_refused(registered, place):
     with pytest.raises(BrrpError, match="no configuration of sphere") as error:
         reconstruct(frame, method="sphere", config=preset("paper"))
     assert error.value.expected == SphereConfig.__name__
+
+
+@pytest.mark.parametrize("given", ["frame.npz", Path("frame.npz"), None])
+def test_what_is_no_frame_is_told_how_to_become_one(registered, given):
+    with Reconstructor(method="sphere") as session:
+        for run in (session, lambda frame: reconstruct(frame, method="sphere")):
+            with pytest.raises(BrrpError, match=r"That is no frame(.|\n)*load_frame"):
+                run(given)

@@ -120,3 +120,9 @@ def test_no_prior_and_no_json_are_told(tmp_path: Path) -> None:
     (tmp_path / "manifest.json").write_text('{"kind": ')
     with pytest.raises(PriorError, match="cannot be used"):
         open_prior(tmp_path)
+
+
+@pytest.mark.parametrize("path", [None, 3])
+def test_what_is_no_path_is_told(path: object) -> None:
+    with pytest.raises(PriorError, match=r"no path of a prior(.|\n)*build-prior"):
+        open_prior(path)  # type: ignore[arg-type]
