@@ -304,6 +304,8 @@ def test_compressed_messages_are_decoded(scene):
         format="16UC1; compressedDepth png", data=b"\0" * 12 + buffer.getvalue()
     )
     assert np.array_equal(depth_of(depth), millimetres)
+    with pytest.raises(FrameError, match="one wide number a pixel"):
+        colour_of(SimpleNamespace(format="mono16; png compressed", data=buffer.getvalue()))
     buffer = io.BytesIO()
     Image.fromarray(scene.rgb).save(buffer, "png")
     colour = SimpleNamespace(format="rgb8; png compressed rgb8", data=buffer.getvalue())
