@@ -73,7 +73,7 @@ class ColourConfig:
     turns: int = 24
     apart: float = 0.5
     alike: float = 0.2
-    worth: float = 0.6
+    worth: float = 1.0
     gain: float = 0.05
     textured: float = 30.0
     cell: float = 0.012
