@@ -76,13 +76,13 @@ def only_bar(total: int, label: str) -> Iterator[Callable[[], None]]:
 
 
 @contextmanager
-def hushed() -> Iterator[None]:
-    """Without notes, and without what the log tells below warnings, unless that is --verbose."""
+def hushed(below: int = logging.WARNING) -> Iterator[None]:
+    """Without notes, and without what the log tells below that level, unless that is --verbose."""
     token = _HUSHED.set(True)
     log = logging.getLogger("brrp_cli")
     before = log.level
-    if log.getEffectiveLevel() == logging.INFO:
-        log.setLevel(logging.WARNING)
+    if logging.INFO <= log.getEffectiveLevel() < below:
+        log.setLevel(below)
     try:
         yield
     finally:

@@ -44,4 +44,9 @@ def few(names: Sequence[str]) -> str:
 
 def counted(number: int, noun: str) -> str:
     """`1 object`, `2 objects`."""
-    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
+    return f"{number} {agreed(number, noun, f'{noun}s')}"
+
+
+def agreed(number: int, one: str, many: str) -> str:
+    """The word that goes with that number: `was` of one, `were` of several."""
+    return one if number == 1 else many

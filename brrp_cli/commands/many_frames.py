@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import logging
 import re
 import time
 from collections.abc import Callable
@@ -22,8 +23,8 @@ from brrp_cli.commands.frames_summary import (
     write_summary,
 )
 from brrp_cli.errors import BrrpError, FrameError, OutputError, ResultError, unexpected
-from brrp_cli.progress import hushed, note, only_bar, say
-from brrp_cli.spoken import counted
+from brrp_cli.progress import hushed, note, only_bar, progress, say
+from brrp_cli.spoken import agreed, counted
 
 if TYPE_CHECKING:
     from brrp_cli.commands.beside import Beside
@@ -63,7 +64,8 @@ class Work:
     """What is done to each frame.
 
     with_masks : (frame, its folder) -> the frame with masks, and how they were made
-    one : (frame, how, its folder) -> what is told of its objects, once all is written
+    one : (the frame as it was read, with masks, how, its folder, whether results that are there
+        are replaced) -> what is told of its objects, once all is written
     beside : what is written beside the results, also of frames that were there
     settings : what decides the result, as result.json holds it
     track : whether the frames are those of a stream
@@ -71,7 +73,7 @@ class Work:
 
     source: SourceOptions
     with_masks: Callable[[Frame, Path], tuple[Frame, MadeMasks | None]]
-    one: Callable[[Frame, MadeMasks | None, Path], list[Told]]
+    one: Callable[[Frame, Frame, MadeMasks | None, Path, bool], list[Told]]
     beside: Beside
     settings: dict[str, Any]
     overwrite: bool
@@ -107,29 +109,37 @@ def folder_name(name: str) -> str:
 def run_many(work: Work, frames: slice, output: Path, report: dict[str, Any]) -> bool:
     """All chosen frames, one after the other; what goes wrong with one is told and ends nothing.
 
-    Frames that were written before with the same settings are left as they are, unless all are to
-    be overwritten. Returns whether any frame, or any object of one, failed. Errors: BrrpError for
-    what concerns every frame; UsageError where none is chosen.
+    Frames that were written before with the same settings, from the same images and masks, are left
+    as they are, unless all are to be overwritten. Returns whether any frame, or any object of one,
+    failed. Errors: BrrpError for what concerns every frame; UsageError where none is chosen.
     """
     every = work.source.names()
     chosen = every[frames]
     if not chosen:
         raise click.UsageError(f"--frames chooses none of the {len(every)} frames of the source")
     folders = _folders(chosen, output)
-    done = {
+    there = {
         name: stored
         for name in chosen
         if not work.overwrite and (stored := _done(folders[name], work.settings)) is not None
     }
     source = str(work.source.path)
     settings = work.settings | ({"track": True} if work.track else {})
-    if done:
+    if there:
         _check_track(output, track=work.track)
+    done = _same(work, there)
+    if changed := len(there) - len(done):
+        note(
+            f"{counted(changed, 'frame')} {agreed(changed, 'was', 'were')} reconstructed from other"
+            f" images or masks and {agreed(changed, 'is', 'are')} done again"
+        )
+    if done:
+        were = f"{len(done)} of {counted(len(chosen), 'frame')} {agreed(len(done), 'was', 'were')}"
         if work.track and len(done) < len(chosen):
-            note(f"{len(done)} of {len(chosen)} frames were there; a stream is done from its start")
+            note(f"{were} there; a stream is done from its start")
             done = {}
         else:
-            note(f"{len(done)} of {len(chosen)} frames were there and are left")
+            note(f"{were} there and {agreed(len(done), 'is', 'are')} left")
     earlier = earlier_frames(output, source, settings)
     told: list[dict[str, Any]] = [
         earlier.get(name, {}) | {"frame": name, "folder": folders[name].name, "status": SKIPPED}
@@ -151,7 +161,7 @@ def run_many(work: Work, frames: slice, output: Path, report: dict[str, Any]) ->
             if name in done:
                 failed |= _complete(work, about, done[name])
                 continue
-            failed |= _frame(work, about, folders[name])
+            failed |= _frame(work, about, folders[name], again=name in there)
             step()
             if first:  # what holds for every frame has been noted once
                 stack.enter_context(hushed())
@@ -161,7 +171,11 @@ def run_many(work: Work, frames: slice, output: Path, report: dict[str, Any]) ->
     count = {status: sum(a["status"] == status for a in told) for status in (DONE, FAILED, SKIPPED)}
     say(
         f"Wrote {count[DONE]} of {counted(len(chosen), 'frame')}"
-        + (f", {count[SKIPPED]} were there" if count[SKIPPED] else "")
+        + (
+            f", {count[SKIPPED]} {agreed(count[SKIPPED], 'was', 'were')} there"
+            if count[SKIPPED]
+            else ""
+        )
         + (f", {count[FAILED]} failed" if count[FAILED] else "")
         + f": {output}/ (FRAME/ as of one frame, {SUMMARY})"
     )
@@ -196,13 +210,13 @@ def _complete(work: Work, about: dict[str, Any], stored: StoredResult) -> bool:
     return False
 
 
-def _frame(work: Work, about: dict[str, Any], folder: Path) -> bool:
-    """One frame; whether it, or one of its objects, failed."""
+def _frame(work: Work, about: dict[str, Any], folder: Path, *, again: bool) -> bool:
+    """One frame, `again` if results of it are there; whether it, or one of its objects, failed."""
     name, start = about["frame"], time.perf_counter()
     try:
-        seen = replace(work.source, index=name if _many(work.source) else None).read()
+        read = _read(work.source, name)
         with redirect_stdout(io.StringIO()):
-            table = work.one(*work.with_masks(seen, folder), folder)
+            table = work.one(read, *work.with_masks(read, folder), folder, again)
     except (click.ClickException, OSError):
         raise
     except BrrpError as error:
@@ -218,12 +232,13 @@ def _frame(work: Work, about: dict[str, Any], folder: Path) -> bool:
     return any(each.failed for each in table)
 
 
-def _many(source: SourceOptions) -> bool:
-    """Whether the format takes --index at all."""
+def _read(source: SourceOptions, name: str) -> Frame:
+    """A frame by its name, which formats of one frame do not take. Errors: FrameError."""
     from brrp_cli.frames.readers import format_of
 
     assert source.path is not None
-    return format_of(source.path).names is not None
+    many = format_of(source.path).names is not None
+    return replace(source, index=name if many else None).read()
 
 
 def _failure(about: dict[str, Any], error: BrrpError) -> bool:
@@ -285,6 +300,44 @@ def _done(folder: Path, settings: dict[str, Any]) -> StoredResult | None:
             fix="choose another folder with -o, or pass --overwrite to do all frames again",
         )
     return stored
+
+
+def _same(work: Work, there: dict[str, StoredResult]) -> dict[str, StoredResult]:
+    """Those of the results that are of what the source holds now; all those that do not tell of
+    what they are. Errors: OutputError for results of another source."""
+    from brrp_cli.results.frame_digest import frame_digest
+
+    same = {}
+    # What there is to say of a frame is said where it is done.
+    with hushed(below=logging.ERROR):
+        for name, stored in progress(there.items(), "what is there", len(there)):
+            digest = stored.record.get("source_sha256")
+            if digest is None:
+                same[name] = stored
+                continue
+            try:
+                read = _read(work.source, name)
+            except FrameError:  # told where the frame is done
+                continue
+            if digest == frame_digest(read):
+                same[name] = stored
+            else:
+                _check_source(stored, read)
+    return same
+
+
+def _check_source(stored: StoredResult, read: Frame) -> None:
+    """OutputError for results of a frame of that name of another source: nobody asked for them to
+    be replaced, as those of a frame that was corrected are."""
+    before = stored.record.get("source")
+    if Path(str(before)).resolve() != Path(str(read.source)).resolve():
+        raise OutputError(
+            "A frame of this name was reconstructed from another source before",
+            where=stored.folder,
+            expected=f"results of {read.source}",
+            found=f"results of {before}, which are others",
+            fix="choose another folder with -o, or pass --overwrite to do all frames again",
+        )
 
 
 def _flat(settings: dict[str, Any], above: str = "") -> dict[str, Any]:

@@ -215,8 +215,8 @@ def command(
     hand = check_gripper(grasp_it, gripper)
     chosen = METHODS[method]
     check_options(chosen, preset_name, device)
-    read = None if file is None else read_config(file)
-    config = chosen.preset(preset_name) if read is None else read.config(chosen, preset_name)
+    own = None if file is None else read_config(file)
+    config = chosen.preset(preset_name) if own is None else own.config(chosen, preset_name)
     config = replace(config, k=k) if k else config
     output = output or source.name.with_name(f"{source.name.name}_{method}")
     # What can be refused is refused before the work, not after it.
@@ -225,9 +225,9 @@ def command(
     if frames is not None:
         check_many(source, output, open_it=open_it)
     else:
-        seen = source.read()
-        check_output(output, seen, coordinates, overwrite=overwrite)
-    mask_config = SegmentConfig() if read is None else read.segmentation()
+        read = source.read()
+        check_output(output, read, coordinates, overwrite=overwrite)
+    mask_config = SegmentConfig() if own is None else own.segmentation()
 
     def with_masks(frame: Frame, folder: Path) -> tuple[Frame, MadeMasks | None]:
         again = overwrite or frames is not None
@@ -243,13 +243,13 @@ def command(
         return make_masks(source, frame, folder, seed, mask_config, overwrite=again)
 
     if frames is None:
-        seen, masks = with_masks(seen, output)
+        seen, masks = with_masks(read, output)
     prior, retrieval = open_prior_of(chosen, prior_path, config, retriever, clip_dir, seed)
     if prior is not None and k is not None and k > len(prior.names):
         note(f"--k {k}: all of the prior's {counted(len(prior.names), 'object')} are taken")
     if prior is None:
-        own = chosen.own_weights
-        used = weights or (own and f"{own.stem} (what comes with brrp)")
+        came = chosen.own_weights
+        used = weights or (came and f"{came.stem} (what comes with brrp)")
         note(f"Method: {method}, without a prior" + (f", weights {used}" if used else ""))
     given: dict[str, Any] = {
         "prior": prior,
@@ -276,11 +276,14 @@ def command(
         seed=seed,
     )
 
-    def one(frame: Frame, masks: MadeMasks | None, output: Path) -> list[Told]:
+    def one(
+        read: Frame, frame: Frame, masks: MadeMasks | None, output: Path, again: bool
+    ) -> list[Told]:
         """Reconstruct a frame, write it all, and say what was written."""
         result = do(frame, masks, output)
         # A stream is followed from its first frame, whatever of it was there.
-        write_results(result, output, frame=coordinates, overwrite=overwrite or track)
+        replaces = overwrite or track or again
+        write_results(result, output, frame=coordinates, overwrite=replaces, read=read)
         table = told(result)
         done = len(result.reconstructed)
         for line in lines(table):
@@ -309,7 +312,7 @@ def command(
             work = Work(source, with_masks, one, beside, settings, overwrite, track)
             failed = run_many(work, frames, output, report)
         else:
-            table = one(seen, masks, output)
+            table = one(read, seen, masks, output, overwrite)
             report["objects"] = [each.record() for each in table]
             failed = any(each.failed for each in table)
     if failed:

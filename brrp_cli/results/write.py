@@ -25,6 +25,7 @@ from brrp_cli.reconstruction import (
     Surface,
 )
 from brrp_cli.rendering.preview import preview
+from brrp_cli.results.frame_digest import frame_digest
 from brrp_cli.results.posterior_file import save_posteriors
 from brrp_cli.spoken import either
 from brrp_cli.surface.painting import surface_colours
@@ -44,15 +45,22 @@ LIBRARIES = ("torch", "open3d", "numpy", "scipy", "scikit-image", "trimesh", "h5
 
 
 def write_results(
-    result: Reconstruction, folder: Path, *, frame: str = "camera", overwrite: bool = False
+    result: Reconstruction,
+    folder: Path,
+    *,
+    frame: str = "camera",
+    overwrite: bool = False,
+    read: Frame | None = None,
 ) -> list[Path]:
     """Write everything into `folder`, whole or not at all; returns the paths of the files.
 
     Where no object has a surface there is no scene.glb: a scene of nothing cannot be exported.
 
-    frame : "camera" or "world", the frame of the meshes (metres either way). Errors: OutputError
-    if the folder exists and `overwrite` is false, if it cannot be written, or if "world" is asked
-    of a frame without T_world_cam.
+    frame : "camera" or "world", the frame of the meshes (metres either way)
+    read : the frame as it was read, before masks were made or mended, whose digest is recorded
+
+    Errors: OutputError if the folder exists and `overwrite` is false, if it cannot be written, or
+    if "world" is asked of a frame without T_world_cam.
     """
     from PIL import Image
 
@@ -66,8 +74,9 @@ def write_results(
         posteriors = {o.object_id: o.posterior for o in result.objects if o.posterior is not None}
         save_posteriors(posteriors, partial / POSTERIOR)
         save_frame(result.frame, partial / FRAME)
-        record = json.dumps(result_record(result, frame), indent=2, allow_nan=False) + "\n"
-        (partial / RECORD).write_text(record)
+        record = result_record(result, frame, read)
+        text = json.dumps(record, indent=2, allow_nan=False) + "\n"
+        (partial / RECORD).write_text(text)
         caption = (
             f"retrieved by {result.retriever}" if result.retriever else f"{result.method}, no prior"
         )
@@ -148,7 +157,7 @@ def _scene(meshes: dict[int, trimesh.Trimesh]) -> trimesh.Scene:
     return scene
 
 
-def result_record(result: Reconstruction, frame: str) -> dict[str, Any]:
+def result_record(result: Reconstruction, frame: str, read: Frame | None = None) -> dict[str, Any]:
     """result.json: what was found, and all that it takes to find it again."""
     source = result.frame.source
     T_target_cam = T_frame_cam(result.frame, frame)
@@ -156,6 +165,7 @@ def result_record(result: Reconstruction, frame: str) -> dict[str, Any]:
         "schema": SCHEMA,
         "brrp": __version__,
         "source": None if source is None else str(source),
+        "source_sha256": None if read is None else frame_digest(read),
         "frame": frame,
         "units": "metre",
         "T_frame_cam": T_target_cam.tolist(),

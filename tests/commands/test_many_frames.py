@@ -235,3 +235,94 @@ def test_a_frame_that_was_corrected_since_fails_alone(source, tmp_path):
     assert "f1.npz: was there; new: grasps.json" in result.stdout
     told = json.loads((out / "frames.json").read_text())["frames"]
     assert [each["status"] for each in told] == ["failed", "was there"]
+
+
+def moved(folder: Path, name: str) -> None:
+    """Another picture under that name."""
+    box = in_camera(solids.moved(solids.box(0.05, 0.09, 0.12), y=-0.04), T_CAM_WORLD)
+    save_frame(photograph({1: box}), folder / name)
+
+
+def digests(out: Path) -> dict[str, str]:
+    return {
+        path.parent.name: json.loads(path.read_text())["source_sha256"]
+        for path in sorted(out.glob("*/result.json"))
+    }
+
+
+def test_frames_of_another_source_are_not_there_and_are_not_replaced_unasked(source, tmp_path):
+    out, other = tmp_path / "out", tmp_path / "other"
+    assert run(source, "--frames", ":2", "-o", out).exit_code == 0
+    before = {p: p.read_bytes() for p in out.rglob("*") if p.is_file()}
+    shutil.copytree(source, other)
+    moved(other, "f1.npz")
+    result = run(other, "--frames", ":2", "-o", out)
+    assert result.exit_code == 1 and "from another source before" in result.output
+    assert f"results of {other / 'f1.npz'}" in result.output
+    assert f"results of {source / 'f1.npz'}" in result.output
+    assert "--overwrite" in result.output and "Traceback" not in result.output
+    assert {p: p.read_bytes() for p in out.rglob("*") if p.is_file()} == before
+    assert run(other, "--frames", ":2", "-o", out, "--overwrite").exit_code == 0
+    written, asked = load_frame(out / "f1.npz" / "frame.npz"), load_frame(other / "f1.npz")
+    assert np.array_equal(written.segmap, asked.segmap)
+    assert json.loads((out / "frames.json").read_text())["source"] == str(other)
+
+
+def test_the_same_frames_in_another_place_are_there(source, tmp_path):
+    out, other = tmp_path / "out", tmp_path / "other"
+    assert run(source, "--frames", ":2", "-o", out).exit_code == 0
+    source.rename(other)
+    again = run(other, "--frames", ":2", "-o", out)
+    assert again.exit_code == 0 and "2 of 2 frames were there and are left" in again.stderr
+
+
+def test_a_frame_whose_masks_were_corrected_at_its_source_is_done_again(source, tmp_path):
+    out = tmp_path / "out"
+    assert run(source, "--frames", ":2", "-o", out, "--html").exit_code == 0
+    first = digests(out)
+    frame = load_frame(source / "f0.npz")
+    save_frame(frame.with_masks(np.where(frame.segmap == 1, 7, 0)), source / "f0.npz")
+    (out / "f0.npz.masks.png").touch()
+    kept = (out / "f1.npz" / "object_1.ply").stat().st_mtime_ns
+    again = run(source, "--frames", ":2", "-o", out)
+    assert again.exit_code == 0, again.output
+    assert "1 frame was reconstructed from other images or masks and is done again" in again.stderr
+    assert "1 of 2 frames was there and is left" in again.stderr
+    assert "Wrote 1 of 2 frames, 1 was there" in again.stdout
+    assert (out / "f0.npz" / "object_7.ply").is_file()
+    assert not (out / "f0.npz" / "object_1.ply").exists()
+    assert not (out / "f0.npz" / "view.html").exists(), "it showed the masks before"
+    assert (out / "f1.npz" / "object_1.ply").stat().st_mtime_ns == kept
+    now = digests(out)
+    assert now["f0.npz"] != first["f0.npz"] and now["f1.npz"] == first["f1.npz"]
+    # Nothing changed since: nothing is done.
+    assert "Wrote 0 of 2 frames, 2 were there" in run(source, "--frames", ":2", "-o", out).stdout
+
+
+def test_masks_that_are_made_on_the_way_are_no_change_of_the_source(source, tmp_path):
+    save_frame(load_frame(source / "f0.npz").without_masks(), source / "f0.npz")
+    out = tmp_path / "out"
+    assert run(source, "--frames", ":1", "-o", out).exit_code == 0
+    again = run(source, "--frames", ":1", "-o", out)
+    assert "Wrote 0 of 1 frame, 1 was there" in again.stdout, again.output
+    assert "Masks: made" not in again.stderr
+
+
+def test_results_that_do_not_tell_of_which_frame_they_are_stay(source, tmp_path):
+    out = tmp_path / "out"
+    assert run(source, "--frames", ":1", "-o", out).exit_code == 0
+    path = out / "f0.npz" / "result.json"
+    record = json.loads(path.read_text())
+    del record["source_sha256"]
+    path.write_text(json.dumps(record))
+    moved(source, "f0.npz")
+    assert "Wrote 0 of 1 frame, 1 was there" in run(source, "--frames", ":1", "-o", out).stdout
+
+
+def test_a_frame_that_can_be_read_no_more_fails_and_its_results_stay(source, tmp_path):
+    out = tmp_path / "out"
+    assert run(source, "--frames", ":2", "-o", out).exit_code == 0
+    (source / "f0.npz").write_bytes((source / "f0.npz").read_bytes()[:500])
+    again = run(source, "--frames", ":2", "-o", out)
+    assert again.exit_code == 3 and again.stderr.count("Error: frame f0.npz: ") == 1
+    assert (out / "f0.npz" / "object_1.ply").is_file()

@@ -84,3 +84,16 @@ def test_what_does_not_go_with_a_stream_is_a_usage_error(arguments, says, source
     result = run(source, *arguments, "-o", tmp_path / "out")
     assert result.exit_code == 2 and says in result.output
     assert not (tmp_path / "out").exists()
+
+
+def test_a_stream_with_a_frame_that_changed_is_done_from_its_start(source, tmp_path):
+    out = tmp_path / "out"
+    run(source, "--frames", "0:2", "--track", "-o", out)
+    save_frame(scene(START, yaw=YAW + 0.03, known=True), source / "f1.npz")
+    again = run(source, "--frames", "0:2", "--track", "-o", out)
+    assert again.exit_code == 0, again.output
+    assert "1 frame was reconstructed from other images or masks" in again.stderr
+    assert "1 of 2 frames was there; a stream is done from its start" in again.stderr
+    assert "Wrote 2 of 2 frames" in again.stdout
+    again = run(source, "--frames", "0:2", "--track", "-o", out)
+    assert "Wrote 0 of 2 frames, 2 were there" in again.stdout
