@@ -7,6 +7,7 @@ from shlex import quote
 
 import click
 
+from brrp_cli.commands.output_file import require_suffix
 from brrp_cli.commands.seed_option import SEED
 from brrp_cli.commands.source_options import SourceOptions, require_output, source_options
 from brrp_cli.errors import FrameError
@@ -46,8 +47,7 @@ def command(
     if segment and source.prompt is not None:
         raise click.UsageError("--segment uses no model: leave it out beside --prompt")
     output = require_output(output)
-    if output.suffix != ".npz":
-        raise click.UsageError(f"-o must end in .npz, not {output.name!r}")
+    require_suffix(output, ".npz")
     source.check()
     picture = output.with_suffix(".masks.png")
     for path in [output, picture] if makes_masks else [output]:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from brrp_cli.commands.json_option import json_option, report_of
+from brrp_cli.commands.output_file import require_suffix
 from brrp_cli.commands.seed_option import SEED, SEED_HELP
 from brrp_cli.config.grasping import GraspConfig, SurroundingsConfig
 from brrp_cli.grasping.gripper_file import DEFAULT, gripper_names, open_gripper
@@ -33,6 +34,7 @@ GRIPPER_HELP = f"{', '.join(gripper_names())}, or a YAML file."
     "-o",
     "--output",
     type=click.Path(path_type=Path),
+    metavar="GRASPS.json",
     help=f"File to write. [default: OUT/{RECORD}]",
 )
 @click.option(
@@ -123,6 +125,9 @@ def command(
     from brrp_cli.api import open_result
     from brrp_cli.files import check_writable, refuse_existing
 
+    if output is not None:
+        require_suffix(output, ".json")
+        refuse_results(files_of(output, layout))
     hand = open_gripper(gripper)
     for path in [] if output is None else files_of(output, layout):
         refuse_existing(path, overwrite=overwrite)
@@ -155,6 +160,18 @@ def files_of(record: Path, layout: str) -> list[Path]:
     if layout == JSON:
         return paths
     return [*paths, record.with_suffix(Path(LAYOUTS[layout][0]).suffix)]
+
+
+def refuse_results(paths: list[Path]) -> None:
+    """UsageError for names that files of a reconstruction have: these are never replaced."""
+    from brrp_cli.results import write
+
+    theirs = (write.RECORD, write.SCENE, write.FRAME)
+    taken = [path.name for path in paths if path.name in theirs]
+    if taken:
+        raise click.UsageError(
+            f"{taken[0]} is a file of `brrp reconstruct`: name the grasps otherwise with -o"
+        )
 
 
 def grasp(

@@ -11,6 +11,7 @@ import click
 from brrp_cli.commands.build_prior import keep_descriptions, told_failures
 from brrp_cli.commands.exit_codes import SOME_FAILED
 from brrp_cli.commands.json_option import json_option, report_of
+from brrp_cli.commands.output_file import require_suffix
 from brrp_cli.prior.default import locate_prior
 from brrp_cli.prior.locate import output_prior
 from brrp_cli.progress import note, quiet
@@ -194,6 +195,8 @@ def show(name: str, prior: Path | None, out: Path | None, overwrite: bool) -> No
     from brrp_cli.prior.names import unknown_object
     from brrp_cli.prior.store import open_prior
 
+    if out is not None:
+        require_suffix(out, ".png")
     folder, _ = locate_prior(prior)
     opened = open_prior(folder)
     if name not in opened.index.rows:

@@ -11,6 +11,7 @@ import click
 from brrp_cli.commands.frame import tell
 from brrp_cli.commands.json_option import json_option, report_of
 from brrp_cli.commands.method_options import CONFIG_HELP
+from brrp_cli.commands.output_file import require_suffix
 from brrp_cli.commands.seed_option import SEED, SEED_HELP
 from brrp_cli.commands.source_options import SourceOptions, require_output, source_options
 from brrp_cli.files import refuse_existing
@@ -100,8 +101,7 @@ def command(
     """
     source.check()
     output = require_output(output)
-    if output.suffix != ".npz":
-        raise click.UsageError(f"-o must end in .npz, not {output.name!r}")
+    require_suffix(output, ".npz")
     if any(len(ids) < 2 for ids in merges):
         raise click.UsageError("--merge takes two ids or more: --merge 3,4")
     named = Counter(i for group in [*merges, *drops] for i in {*group})

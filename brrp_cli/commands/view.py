@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from brrp_cli.commands.output_file import require_suffix
 from brrp_cli.commands.results_folder import require_results
 from brrp_cli.progress import note
 
@@ -53,6 +54,7 @@ def command(
     from brrp_cli.files import refuse_existing
 
     if output is not None:
+        require_suffix(output, ".rrd" if rerun else ".html")
         refuse_existing(output, overwrite=overwrite)
     require_results(results)
 

@@ -37,6 +37,7 @@ if TYPE_CHECKING:
 SCHEMA = 1
 RECORD = "result.json"
 FRAME = "frame.npz"
+SCENE = "scene.glb"
 POSTERIOR = "posterior.h5"
 PREVIEW = "preview.png"
 # Metres; vertices are single precision, which has steps of a tenth of a millimetre there.
@@ -70,7 +71,7 @@ def write_results(
         for object_id, mesh in meshes.items():
             mesh.export(partial / mesh_name(object_id))
         if meshes:
-            _scene(meshes).export(partial / "scene.glb")
+            _scene(meshes).export(partial / SCENE)
         posteriors = {o.object_id: o.posterior for o in result.objects if o.posterior is not None}
         save_posteriors(posteriors, partial / POSTERIOR)
         save_frame(result.frame, partial / FRAME)

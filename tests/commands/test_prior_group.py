@@ -56,6 +56,10 @@ def test_add_list_show_remove(folder: Path, tmp_path: Path) -> None:
     again = brrp("prior", "show", "red_box", *prior, "-o", tmp_path / "box.png")
     assert again.exit_code == 1 and "--overwrite" in again.stderr
     assert "red_box" in brrp("prior", "show", "red_bax", *prior).stderr
+    for name in ("box.txt", "box.jpg", "box"):
+        other = brrp("prior", "show", "red_box", *prior, "-o", tmp_path / name)
+        assert other.exit_code == 2 and f"must end in .png, not '{name}'" in other.stderr
+        assert not (tmp_path / name).exists()
     removed = brrp("prior", "remove", "ball", *prior)
     assert "1 object removed; 1 object now" in removed.stdout
     assert brrp("prior", "list", *prior).stdout == "red_box\ta red box\n"

@@ -182,6 +182,24 @@ def test_options_decide(results, tmp_path):
     assert code == 1 and "--overwrite" in output
 
 
+@pytest.mark.parametrize(
+    ("name", "options", "says"),
+    [
+        ("best.glb", (), "must end in .json, not 'best.glb'"),
+        ("best.npy", ("--format", "graspnet"), "must end in .json"),
+        ("folder/", (), "must end in .json"),
+        ("result.json", (), "result.json is a file of `brrp reconstruct`"),
+        ("scene.json", (), "scene.glb is a file"),
+        ("frame.json", ("--format", "contact-graspnet"), "frame.npz is a file"),
+    ],
+)
+def test_grasps_take_no_other_file_s_name(name, options, says, results):
+    before = {path: path.stat().st_mtime_ns for path in results.iterdir()}
+    code, output = run(results, "-o", f"{results}/{name}", "--overwrite", *options)
+    assert code == 2 and says in output
+    assert {path: path.stat().st_mtime_ns for path in results.iterdir()} == before
+
+
 def test_a_hand_keeps_out_of_an_arm_on_demand_alone(tmp_path, planned):
     reach = trimesh.creation.cylinder(0.05, segment=[(-0.1, 0.05, 0.22), (0.0, 0.9, 0.35)])
     under = write_made_result(tmp_path / "under", unmasked=in_camera_frame(reach, T_CAM_WORLD))

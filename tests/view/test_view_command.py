@@ -257,6 +257,16 @@ def test_without_rerun_it_says_what_to_install(results, monkeypatch):
     assert code == 1 and "rerun-sdk" in output and "Traceback" not in output
 
 
+@pytest.mark.parametrize(
+    ("name", "options", "suffix"),
+    [("v.pdf", (), ".html"), ("v.rrd", (), ".html"), ("v.html", ("--rerun",), ".rrd")],
+)
+def test_a_page_is_no_other_kind_of_file(name, options, suffix, results, tmp_path):
+    code, output = run(results, "--no-open", *options, "-o", tmp_path / name)
+    assert code == 2 and f"must end in {suffix}, not '{name}'" in output
+    assert not (tmp_path / name).exists()
+
+
 def test_a_file_of_the_users_is_replaced_only_when_asked(results, tmp_path):
     page = tmp_path / "thesis.html"
     page.write_text("not yours")
