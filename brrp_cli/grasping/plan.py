@@ -6,6 +6,7 @@ best = plan_grasps(open_result("out/"), "franka-hand").grasps[0]
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -29,6 +30,7 @@ from brrp_cli.observation.support_plane import Plane
 from brrp_cli.reconstruction import Reconstruction
 from brrp_cli.results.read import StoredResult
 from brrp_cli.seeds import child_rng
+from brrp_cli.spoken import option
 from brrp_cli.surface.confidence import confidence_surface
 from brrp_cli.threads import cores, in_threads
 
@@ -61,13 +63,15 @@ def plan_grasps(
     hand = gripper if isinstance(gripper, Gripper) else open_gripper(gripper)
     scene = result if isinstance(result, GraspScene) else scene_of(result, config)
     workers = cores() if workers is None else workers
+    # Here, as threads do not know whether it was typed on a command line.
+    asked = option("min_score", f"{min_score:g}")
 
     def shape(item: GraspObject) -> Mesh:
         return collision_shape(item, scene, config)
 
     shapes = [*in_threads(shape, scene.objects, workers), *map(wall_mesh, scene.solids)]
     planned = [
-        _Task(item, i, scene, shapes, hand, config, approach, per_object, min_score, seed)
+        _Task(item, i, scene, shapes, hand, config, approach, per_object, min_score, asked, seed)
         for i, item in enumerate(scene.objects)
     ]
     found = list(in_threads(_plan_object, planned, workers))
@@ -95,7 +99,8 @@ def collision_shape(item: GraspObject, scene: GraspScene, config: GraspConfig) -
 
 @dataclass(frozen=True)
 class _Task:
-    """One object of a scene, the `number`-th, and the shapes of all, then of walls."""
+    """One object of a scene, the `number`-th, and the shapes of all, then of walls; `asked` is how
+    a message names `min_score`."""
 
     item: GraspObject
     number: int
@@ -106,6 +111,7 @@ class _Task:
     approach: str
     per_object: int
     min_score: float
+    asked: str
     seed: int
 
 
@@ -248,7 +254,21 @@ def _ranked(
             fell["neighbour"] += 1
         else:
             grasps.append(_grasp(item, poses, closed, int(i), float(score[i]), float(good[i])))
-    return ObjectGrasps(item.object_id, grasps, fell, "" if grasps else why_none(fell))
+    if grasps:
+        return ObjectGrasps(item.object_id, grasps, fell)
+    below = _best_below(task, poses, score, obstacles)
+    why = why_below(below, task.asked, fell) if below else why_none(fell)
+    return ObjectGrasps(item.object_id, [], fell, why)
+
+
+def _best_below(task: _Task, poses: Poses, score: Array, obstacles: Obstacles) -> float:
+    """The score of the best grasp that is worth a word, that `min_score` alone left out; 0 where
+    there is none."""
+    left = np.flatnonzero((score >= WORTH_A_WORD) & (score < task.min_score))
+    for i in left[np.argsort(-score[left], kind="stable")]:
+        if not obstacles.hits(poses.T[i], float(poses.openings[i]), task.gripper, task.config):
+            return float(score[i])
+    return 0.0
 
 
 def _grasp(
@@ -290,6 +310,7 @@ REASONS = {
     "friction": "it would slip out",
     "weight": "its weight would turn it in the hand",
 }
+WORTH_A_WORD, MOSTLY = 0.01, 0.5  # scores: what is called a grasp, and one that holds mostly
 NOWHERE = "its posterior has no surface to take hold of"
 
 
@@ -302,6 +323,14 @@ def why_none(fell: dict[str, int]) -> str:
         if group:
             return REASONS[max(group, key=lambda key: fell[key])]
     return NOWHERE
+
+
+def why_below(best: float, asked: str, fell: dict[str, int]) -> str:
+    """That the best grasp does not hold as probably as was asked for; where it mostly does not hold
+    at all, also why not."""
+    shown = math.floor(best * 100) / 100  # 0.9599 is not told as 0.96 where 0.96 was asked for
+    text = f"its best grasp holds with probability {shown:.2f}, less than {asked}"
+    return text if best >= MOSTLY else f"{text}: mostly {why_none(fell)}"
 
 
 def _some(points: Array, most: int) -> Array:

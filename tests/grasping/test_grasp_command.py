@@ -214,6 +214,16 @@ def test_a_hand_keeps_out_of_an_arm_on_demand_alone(tmp_path, planned):
     assert abs(blocked[0] - free) < 0.05 * (blocked[1] - free)
 
 
+def test_what_min_score_left_out_is_told_with_the_option_as_typed(results, planned, tmp_path):
+    best = max(grasp["score"] for grasp in of(planned[0], ELL)["grasps"])
+    assert best < 1
+    code, output = run(results, "-o", tmp_path / "g.json", "--min-score", 1)
+    assert code == 0
+    item = of(json.loads((tmp_path / "g.json").read_text()), ELL)
+    assert item["grasps"] == [] and "less than --min-score 1" in item["why_none"]
+    assert f"object {ELL}: no grasp, its best grasp holds with probability 0." in output
+
+
 def message(*arguments: object) -> str:
     code, output = run(*arguments)
     assert code == 1 and output.count("Error: ") == 1 and "Traceback" not in output

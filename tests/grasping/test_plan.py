@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -17,7 +18,7 @@ from brrp_cli.grasping.draws import Mesh, draw_surfaces, mesh_alone
 from brrp_cli.grasping.gripper_file import open_gripper
 from brrp_cli.grasping.hidden_space import NOTHING_HIDDEN
 from brrp_cli.grasping.obstacles import Obstacles
-from brrp_cli.grasping.plan import NOWHERE, plan_grasps, why_none
+from brrp_cli.grasping.plan import NOWHERE, plan_grasps, why_below, why_none
 from brrp_cli.grasping.scene import GraspObject, GraspScene
 from brrp_cli.observation.support_plane import Plane
 from brrp_cli.physics import GRAVITY
@@ -79,6 +80,29 @@ def test_what_is_too_heavy_falls_by_its_weight():
     found = grasps(thing(solids.box(0.05, 0.05, 0.12)), config=GraspConfig(density=1e8))
     assert found.grasps == [] and found.fell["weight"] > found.fell["object"]
     assert "its weight" in found.why
+
+
+def test_what_min_score_alone_left_out_is_told_so():
+    """The score of a grasp of a low box that a robot may miss by a millimetre is below 1."""
+    low = thing(solids.box(0.04, 0.1, 0.012))
+    near = GraspConfig(table_gap=0.001, density=0.0, lightest=0.0)
+    best = max(grasp.score for grasp in grasps(low, config=near, per_object=200).grasps)
+    assert 0.5 < best < 1.0
+    found = grasps(low, config=near, min_score=1.0)
+    shown = math.floor(best * 100) / 100
+    assert found.grasps == []
+    assert found.why == f"its best grasp holds with probability {shown:.2f}, less than min_score=1"
+    # What a neighbour is in the way of as well is no grasp that was left out.
+    wall = thing(solids.moved(solids.box(0.3, 0.3, 0.011), x=0.0, z=0.015), 2)
+    under = grasps(low, wall, config=near, min_score=1.0)
+    assert under.grasps == [] and "min_score" not in under.why
+
+
+def test_where_the_best_grasp_mostly_fails_it_is_also_told_why():
+    fell = {"friction": 7, "object": 2}
+    assert why_below(0.9599, "--min-score 0.96", fell).endswith("0.95, less than --min-score 0.96")
+    told = why_below(0.124, "--min-score 0.3", fell)
+    assert told.endswith("0.12, less than --min-score 0.3: mostly it would slip out")
 
 
 def test_what_has_no_surface_falls_for_no_other_reason():
