@@ -42,9 +42,9 @@ def few(names: Sequence[str]) -> str:
     return ", ".join(names[:5]) + more
 
 
-def counted(number: int, noun: str) -> str:
-    """`1 object`, `2 objects`."""
-    return f"{number} {agreed(number, noun, f'{noun}s')}"
+def counted(number: int, noun: str, nouns: str | None = None) -> str:
+    """`1 object`, `2 objects`; with the plural where it is no mere s, `2 meshes`."""
+    return f"{number} {agreed(number, noun, nouns or f'{noun}s')}"
 
 
 def agreed(number: int, one: str, many: str) -> str:

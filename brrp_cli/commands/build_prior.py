@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -19,7 +20,7 @@ from brrp_cli.retrieval.clip.model_files import clip_folder
 from brrp_cli.spoken import counted
 
 if TYPE_CHECKING:
-    from brrp_cli.prior.manifest import Manifest
+    from brrp_cli.prior.manifest import Failure
 
 
 @click.command("build-prior")
@@ -90,7 +91,7 @@ def command(
         progress=not quiet(),
     )
     manifest = report.manifest
-    told_failures(manifest)
+    told_failures(manifest.failed)
     if report.removed:
         click.echo(f"no longer among the meshes, so removed: {', '.join(report.removed)}", err=True)
     size = sum(shard.bytes for shard in manifest.shards) / 1e6
@@ -105,9 +106,9 @@ def command(
         sys.exit(SOME_FAILED)
 
 
-def told_failures(manifest: Manifest) -> None:
+def told_failures(failed: Iterable[Failure]) -> None:
     """One line on stderr for each mesh that did not become an object."""
-    for failure in manifest.failed:
+    for failure in failed:
         click.echo(f"failed: {failure.source}: {failure.reason}", err=True)
 
 

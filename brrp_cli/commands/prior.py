@@ -100,10 +100,10 @@ def add(
         workers=workers,
         progress=not quiet(),
     )
-    told_failures(report.manifest)
+    told_failures(report.failed)
     click.echo(f"{counted(len(report.made), 'object')} made; {_total(report)}")
     keep_descriptions(report.path, clip_dir)
-    if report.manifest.failed:
+    if report.failed:
         sys.exit(SOME_FAILED)
 
 
@@ -111,7 +111,7 @@ def add(
 @click.argument("names", nargs=-1, required=True)
 @prior_option
 def remove(names: tuple[str, ...], prior: Path | None) -> None:
-    """Remove the objects NAMES from the prior.
+    """Remove the objects NAMES from the prior. Of a mesh that failed nothing is told any more.
 
     \b
     Example:
@@ -122,7 +122,11 @@ def remove(names: tuple[str, ...], prior: Path | None) -> None:
     folder, how = output_prior(prior)
     note(f"Prior: {folder} ({how.replace('-o', '--prior')})")
     report = remove_objects(folder, names)
-    click.echo(f"{counted(len(report.removed), 'object')} removed; {_total(report)}")
+    # An object whose new mesh failed is both.
+    failed = [name for name in report.forgotten if name not in report.removed]
+    done = [f"{counted(len(report.removed), 'object')} removed"] * bool(report.removed)
+    done += [f"{counted(len(failed), 'failed mesh', 'failed meshes')} forgotten"] * bool(failed)
+    click.echo(f"{', '.join(done)}; {_total(report)}")
     keep_descriptions(report.path, None)
 
 
@@ -145,7 +149,7 @@ def merge(priors: tuple[Path, ...], out: Path, overwrite: bool, clip_dir: Path |
     from brrp_cli.prior.build.edit import merge_priors
 
     report = merge_priors(priors, out, overwrite=overwrite)
-    click.echo(f"{len(priors)} priors merged; {_total(report)}")
+    click.echo(f"{counted(len(priors), 'prior')} merged; {_total(report)}")
     keep_descriptions(report.path, clip_dir)
 
 

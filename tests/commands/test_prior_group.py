@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -63,6 +64,28 @@ def test_add_list_show_remove(folder: Path, tmp_path: Path) -> None:
     removed = brrp("prior", "remove", "ball", *prior)
     assert "1 object removed; 1 object now" in removed.stdout
     assert brrp("prior", "list", *prior).stdout == "red_box\ta red box\n"
+
+
+def test_only_failures_of_what_is_added_are_told_and_one_can_be_forgotten(
+    folder: Path, tmp_path: Path
+) -> None:
+    prior = ("--prior", shutil.copytree(folder / "prior", tmp_path / "prior"))
+    bad = tmp_path / "bad.stl"
+    bad.write_text("no mesh")
+    broken = brrp("prior", "add", bad, "--workers", 1, *prior)
+    assert broken.exit_code == 3 and broken.stderr.count("failed: ") == 1
+    added = brrp("prior", "add", folder / "b/ball.stl", "--workers", 1, *prior)
+    assert added.exit_code == 0 and "failed" not in added.stderr, added.stderr
+    assert "1 object made; 2 objects now" in added.stdout
+    again = brrp("prior", "add", bad, "--workers", 1, *prior)
+    assert again.exit_code == 3 and again.stderr.count("failed: ") == 1
+    gone = brrp("prior", "remove", "bad", *prior)
+    assert gone.exit_code == 0 and gone.stdout.startswith("1 failed mesh forgotten; 2 objects now")
+    assert "no such object" in brrp("prior", "remove", "bad", *prior).stderr.lower()
+    both = brrp("prior", "add", bad, "--workers", 1, *prior)
+    assert both.exit_code == 3
+    both = brrp("prior", "remove", "bad", "ball", *prior)
+    assert both.stdout.startswith("1 object removed, 1 failed mesh forgotten; 1 object now")
 
 
 def test_merge_tells_what_is_in_the_new_prior(folder: Path, tmp_path: Path) -> None:

@@ -7,6 +7,7 @@ build is: under the prior's lock, shards first, the manifest last.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from brrp_cli.errors import MeshError, PriorError
@@ -22,11 +23,23 @@ from brrp_cli.prior.build.build import (
 from brrp_cli.prior.build.descriptions import phrases_of
 from brrp_cli.prior.build.find_meshes import find_all_meshes
 from brrp_cli.prior.build.reuse import Finished, Reusable, unlisted_objects
-from brrp_cli.prior.manifest import FILE, Manifest, ObjectEntry, read_bytes, read_manifest
+from brrp_cli.prior.manifest import FILE, Failure, Manifest, ObjectEntry, read_bytes, read_manifest
 from brrp_cli.prior.names import unknown_object
 from brrp_cli.prior.parameters import differences, restore_parameters
 from brrp_cli.prior.shard import damaged
 from brrp_cli.threads import cores
+
+
+@dataclass(frozen=True)
+class EditReport(BuildReport):
+    """What an edit did, beside what a build does.
+
+    failed : of the meshes that were given; the manifest tells of earlier ones as well
+    forgotten : names of meshes that failed before and of which nothing is told any more
+    """
+
+    failed: list[Failure] = field(default_factory=list)
+    forgotten: list[str] = field(default_factory=list)
 
 
 def add_objects(
@@ -38,7 +51,7 @@ def add_objects(
     workers: int | None = None,
     time_limit: float = TIME_LIMIT,
     progress: bool = False,
-) -> BuildReport:
+) -> EditReport:
     """Add the objects of folders, or single files, to a prior, made with the prior's parameters.
 
     An object that is there already, of the same mesh, is kept. Errors: PriorError for one of
@@ -61,10 +74,12 @@ def add_objects(
         for key, finished in unlisted_objects(prior, listed, before.parameters).items():
             run.stock.setdefault(key, finished)
         run.make(parameters, Processes(workers or cores()), time_limit, progress)
-        return run.commit(phrases, before)
+        report = run.commit(phrases, before)
+        failed = [failure for failure in report.manifest.failed if failure.name in sources]
+        return EditReport(**vars(report), failed=failed)
 
 
-def remove_objects(prior: Path, names: Iterable[str]) -> BuildReport:
+def remove_objects(prior: Path, names: Iterable[str]) -> EditReport:
     """Remove objects by name; a mesh that failed is told no more. Errors: PriorError for a name
     that is not there, or where none would be left; OutputError."""
     read_bytes(prior)
@@ -80,10 +95,11 @@ def remove_objects(prior: Path, names: Iterable[str]) -> BuildReport:
                 "A prior without objects is none", where=prior, fix="delete its folder instead"
             )
         run = _run(prior, before, kept)
-        for name in gone:
-            run.failed_before.pop(name, None)
+        forgotten = sorted(gone & run.failed_before.keys())
+        for name in forgotten:
+            del run.failed_before[name]
         run.make(restore_parameters(before.parameters, prior / FILE), Processes(1))
-        return run.commit({}, before)
+        return EditReport(**vars(run.commit({}, before)), forgotten=forgotten)
 
 
 def merge_priors(priors: Sequence[Path], out: Path, *, overwrite: bool = False) -> BuildReport:
