@@ -7,12 +7,17 @@ from shlex import quote
 
 import click
 
+from brrp_cli.commands.made_masks import forget, pictures_of
 from brrp_cli.commands.output_file import require_suffix
 from brrp_cli.commands.seed_option import SEED
-from brrp_cli.commands.source_options import SourceOptions, require_output, source_options
+from brrp_cli.commands.source_options import (
+    SourceOptions,
+    require_output,
+    source_options,
+    tell_replaced,
+)
 from brrp_cli.errors import FrameError
 from brrp_cli.files import refuse_existing
-from brrp_cli.progress import note
 from brrp_cli.spoken import counted
 
 
@@ -49,7 +54,8 @@ def command(
     output = require_output(output)
     require_suffix(output, ".npz")
     source.check()
-    picture = output.with_suffix(".masks.png")
+    picture, ids = pictures_of(output)
+    replaced = output.exists()
     for path in [output, picture] if makes_masks else [output]:
         refuse_existing(path, overwrite=overwrite)
 
@@ -59,9 +65,7 @@ def command(
 
     frame = source.read()
     if makes_masks:
-        if frame.object_ids:
-            old = counted(len(frame.object_ids), "object")
-            note(f"Masks: those of the source, {old}, are replaced")
+        tell_replaced(frame)
         frame = require_objects(source.make_masks(frame, seed))
         write_picture(frame, picture)
     elif not frame.object_ids and source.masks is None:
@@ -72,6 +76,8 @@ def command(
             fix="add --segment to find what stands on the table",
         )
     save_frame(require_objects(frame), output)
+    if replaced:
+        forget([ids] if makes_masks else [picture, ids], source)
     tell(frame.shape, len(frame.object_ids), output, picture if makes_masks else None)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from shlex import quote
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
     from brrp_cli.commands.source_options import SourceOptions
     from brrp_cli.config.segmentation import SegmentConfig
     from brrp_cli.frames.frame import Frame
+    from brrp_cli.reconstruction import Reconstruction
 
 
 @dataclass(frozen=True)
@@ -42,8 +44,6 @@ def make_masks(
     """The frame with masks made on the way; a picture of them is written beside the output."""
     from brrp_cli.frames.build import require_objects
 
-    if source.masks is not None:
-        return require_objects(frame), MadeMasks(config, None)
     picture = _picture(output)
     refuse_existing(picture, overwrite=overwrite)
     frame = require_objects(source.make_masks(frame, seed, config))
@@ -94,6 +94,30 @@ def tell_mended(before: Frame, after: Frame, output: Path) -> None:
         f" {counted(len(before.object_ids), 'object')} before,"
         f" {len(after.object_ids)} after: {picture}"
     )
+
+
+def forget_picture(
+    read: Frame, result: Reconstruction, source: SourceOptions, output: Path
+) -> None:
+    """Remove the picture of earlier masks, where results of `read` took the place of others and no
+    picture of their masks was drawn."""
+    import numpy as np
+
+    mended = not np.array_equal(read.segmap, result.frame.segmap)
+    if result.segmentation is None or not (source.prompt or mended):
+        forget([_picture(output)], source)
+
+
+def forget(pictures: Iterable[Path], source: SourceOptions) -> None:
+    """Remove pictures of masks that were replaced, unless they are masks that the user named."""
+    for picture in pictures:
+        if not source.reads(picture):
+            picture.unlink(missing_ok=True)
+
+
+def pictures_of(output: Path) -> tuple[Path, Path]:
+    """Beside a frame file: the picture of its masks, and their ids as an image."""
+    return output.with_suffix(".masks.png"), output.with_suffix(".ids.png")
 
 
 def _picture(output: Path) -> Path:

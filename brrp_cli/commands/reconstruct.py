@@ -15,7 +15,7 @@ from brrp_cli.commands.exit_codes import SOME_FAILED
 from brrp_cli.commands.export import CONFIDENCE, check_libraries
 from brrp_cli.commands.grasp import GRIPPER_HELP
 from brrp_cli.commands.json_option import json_option, report_of
-from brrp_cli.commands.made_masks import MadeMasks, make_masks, masks_of
+from brrp_cli.commands.made_masks import MadeMasks, forget_picture, make_masks, masks_of
 from brrp_cli.commands.many_frames import Work, check_many, frame_slice, run_many
 from brrp_cli.commands.method_options import (
     CONFIG_HELP,
@@ -283,7 +283,10 @@ def command(
         result = do(frame, masks, output)
         # A stream is followed from its first frame, whatever of it was there.
         replaces = overwrite or track or again
+        replaced = output.exists()
         write_results(result, output, frame=coordinates, overwrite=replaces, read=read)
+        if replaced:
+            forget_picture(read, result, source, output)
         table = told(result)
         done = len(result.reconstructed)
         for line in lines(table):

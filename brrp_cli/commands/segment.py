@@ -10,6 +10,7 @@ import click
 
 from brrp_cli.commands.frame import tell
 from brrp_cli.commands.json_option import json_option, report_of
+from brrp_cli.commands.made_masks import pictures_of
 from brrp_cli.commands.method_options import CONFIG_HELP
 from brrp_cli.commands.output_file import require_suffix
 from brrp_cli.commands.seed_option import SEED, SEED_HELP
@@ -99,6 +100,8 @@ def command(
       brrp segment frame.npz --merge 3,4 --split 5 --drop 2 -o frame.npz --overwrite
       brrp segment scene/ --prompt "small object" -o frame.npz
     """
+    if source.masks is not None and again:
+        raise click.UsageError("--masks and --again exclude each other")
     source.check()
     output = require_output(output)
     require_suffix(output, ".npz")
@@ -107,7 +110,7 @@ def command(
     named = Counter(i for group in [*merges, *drops] for i in {*group})
     if twice := [str(i) for i, times in named.items() if times > 1]:
         raise click.UsageError(f"name an id in one --merge or --drop, not in two: {twice[0]}")
-    picture, ids = output.with_suffix(".masks.png"), output.with_suffix(".ids.png")
+    picture, ids = pictures_of(output)
     for path in (output, picture, ids):
         refuse_existing(path, overwrite=overwrite)
 

@@ -12,6 +12,8 @@ import click
 
 from brrp_cli.errors import FrameError
 from brrp_cli.files import exists
+from brrp_cli.progress import note
+from brrp_cli.spoken import counted
 
 if TYPE_CHECKING:
     from brrp_cli.config.segmentation import SegmentConfig
@@ -34,7 +36,11 @@ _OPTIONS = [
         help="JSON: fx, fy and cx, cy (ppx, ppy; x_offset, y_offset), a 3 x 3 K, a ROS "
         "camera_info; or GraspNet's meta.mat.",
     ),
-    click.option("--masks", type=_PATH, help="Object ids: grey PNG or .npy, 0 = background."),
+    click.option(
+        "--masks",
+        type=_PATH,
+        help="Object ids: grey PNG or .npy, 0 = background. With a SOURCE in place of its own.",
+    ),
     click.option(
         "--camera-pose",
         type=_PATH,
@@ -93,7 +99,7 @@ def require_output(output: Path | None) -> Path:
 
 @dataclass(frozen=True)
 class SourceOptions:
-    """What was typed. `path` is SOURCE; it and the three image files exclude each other."""
+    """What was typed. `path` is SOURCE; it and the images of one frame exclude each other."""
 
     path: Path | None
     color: Path | None = None
@@ -113,7 +119,7 @@ class SourceOptions:
         """UsageError for what does not go together."""
         images = {"--color": self.color, "--depth": self.depth, "--intrinsics": self.intrinsics}
         given = [name for name, path in images.items() if path is not None]
-        if self.path is not None and (self.color or self.depth or self.masks):
+        if self.path is not None and (self.color or self.depth):
             raise click.UsageError("give either SOURCE or --color, --depth and --intrinsics")
         if self.path is None and len(given) < len(images):
             lacking = ", ".join(name for name in images if name not in given)
@@ -150,18 +156,26 @@ class SourceOptions:
             depth_topic=self.depth_topic,
         )
 
+    def reads(self, path: Path) -> bool:
+        """Whether that is one of the files that were named."""
+        named = (self.path, self.color, self.depth, self.intrinsics, self.masks, self.camera_pose)
+        return any(each is not None and each.resolve() == path.resolve() for each in named)
+
     def read(self) -> Frame:
-        """The frame, with the masks that it comes with, and the pose that was named or else is
-        there. Errors: FrameError."""
+        """The frame, with the masks and the pose that were named or else are there. Errors:
+        FrameError."""
         from dataclasses import replace
 
-        from brrp_cli.frames.images import read_images
+        from brrp_cli.frames.images import given_masks, read_images
         from brrp_cli.frames.pose_file import read_pose
         from brrp_cli.frames.readers import read_frame
 
         pose = None if self.camera_pose is None else read_pose(self.camera_pose)
         if self.path is not None:
             frame = read_frame(self.path, request=self.request)
+            if self.masks is not None:
+                tell_replaced(frame)
+                frame = frame.with_masks(given_masks(self.masks, frame.shape))
         else:
             assert self.color is not None and self.depth is not None
             assert self.intrinsics is not None
@@ -191,6 +205,13 @@ class SourceOptions:
             return frame.with_masks(*segment_and_aside(frame, seed, config, keep_all=self.keep_all))
         segmap = _prompt_segmenter(self.masks_dir, config)(frame, self.prompt, seed)
         return frame.with_masks(segmap, np.zeros_like(segmap))
+
+
+def tell_replaced(frame: Frame) -> None:
+    """Say where a frame has masks that are not used."""
+    if frame.object_ids:
+        old = counted(len(frame.object_ids), "object")
+        note(f"Masks: those of the source, {old}, are replaced")
 
 
 @cache

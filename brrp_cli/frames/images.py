@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import logging
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from brrp_cli.errors import FrameError
 from brrp_cli.frames.build import make_frame
 from brrp_cli.frames.frame import Frame
 from brrp_cli.frames.intrinsics import Intrinsics, read_intrinsics
+from brrp_cli.frames.masks import check_masks
 from brrp_cli.frames.pixels import read_colour, read_depth, read_masks
 from brrp_cli.spoken import option
 
@@ -41,19 +44,9 @@ def read_images(
     color, depth, intrinsics = Path(color), Path(depth), Path(intrinsics)
     camera = read_intrinsics(intrinsics)
     rgb, raw = read_colour(color), read_depth(depth)
-    ids = None if masks is None else read_masks(Path(masks))
     shape = rgb.shape[:2]
     _same_size(shape, raw.shape[:2], depth)
-    if ids is not None:
-        _same_size(shape, ids.shape[:2], Path(masks or ""))
-        if not np.any(ids):
-            raise FrameError(
-                "There is no object in the mask",
-                where=masks,
-                expected="at least one pixel that is not 0",
-                found="0 (background) everywhere",
-                fix="leave it out, and masks are made from depth",
-            )
+    ids = None if masks is None else _own_masks(Path(masks), shape)
     if camera.shape is not None:
         _same_size(shape, camera.shape, intrinsics)
     if depth_scale is None and raw.dtype.kind in "iu":
@@ -78,6 +71,26 @@ def read_images(
         "" if said else f"; {option('depth_scale')} says otherwise",
     )
     return frame
+
+
+def given_masks(path: Path, shape: tuple[int, ...]) -> NDArray[np.int64]:
+    """(H, W) object ids of a file, for a frame of that shape that was read without them. Errors:
+    FrameError, also where the sizes disagree."""
+    return check_masks(_own_masks(path, shape), path)
+
+
+def _own_masks(path: Path, shape: tuple[int, ...]) -> NDArray[Any]:
+    ids = read_masks(path)
+    _same_size(shape, ids.shape[:2], path)
+    if not np.any(ids):
+        raise FrameError(
+            "There is no object in the mask",
+            where=path,
+            expected="at least one pixel that is not 0",
+            found="0 (background) everywhere",
+            fix="leave it out, and masks are made from depth",
+        )
+    return ids
 
 
 def _same_size(color: tuple[int, ...], other: tuple[int, ...], path: Path) -> None:

@@ -132,6 +132,65 @@ def test_masks_and_segment_exclude_each_other(images):
     assert result.exit_code == 2
 
 
+def own_masks(images):
+    """Other masks than m.png, of one object, and a frame with the latter."""
+    own = np.zeros((HEIGHT, WIDTH), np.uint16)
+    own[40:80, 30:60] = 3
+    Image.fromarray(own).save(images / "own.png")
+    assert run(images, "--masks", images / "m.png", "-o", images / "f.npz").exit_code == 0
+    return own
+
+
+def test_masks_of_one_s_own_replace_those_of_a_source(images):
+    own = own_masks(images)
+    arguments = ["frame", images / "f.npz", "--masks", images / "own.png", "-o", images / "g.npz"]
+    result = CliRunner().invoke(main, list(map(str, arguments)))
+    assert result.exit_code == 0, result.output
+    assert "those of the source, 2 objects, are replaced" in result.stderr
+    before, found = load_frame(images / "f.npz"), load_frame(images / "g.npz")
+    assert np.array_equal(found.segmap, own)
+    assert np.array_equal(found.points, before.points, equal_nan=True)
+
+
+@pytest.mark.parametrize(
+    ("masks", "says"),
+    [
+        (np.ones((HEIGHT // 2, WIDTH), np.uint8), "The sizes disagree"),
+        (np.zeros((HEIGHT, WIDTH), np.uint8), "There is no object in the mask"),
+        (np.full((HEIGHT, WIDTH), 0.5), "segmap is no map of object ids"),
+    ],
+)
+def test_masks_that_do_not_fit_a_source_are_one_message(images, masks, says):
+    own_masks(images)
+    np.save(images / "wrong.npy", masks)
+    arguments = ["frame", images / "f.npz", "--masks", images / "wrong.npy", "-o", images / "g.npz"]
+    result = CliRunner().invoke(main, list(map(str, arguments)))
+    assert result.exit_code == 1
+    assert says in result.output and f"where:    {images / 'wrong.npy'}" in result.output
+    assert not (images / "g.npz").exists()
+
+
+def test_pictures_of_masks_that_were_replaced_do_not_stay(images):
+    beside = images / "f.masks.png", images / "f.ids.png"
+    for path in beside:  # of another frame, as none is replaced
+        path.touch()
+    own_masks(images)
+    assert all(path.exists() for path in beside)
+    assert run(images, "--segment", "--overwrite", "-o", images / "f.npz").exit_code == 0
+    assert beside[0].stat().st_size and not beside[1].exists()
+    masks = ("--masks", images / "m.png", "--overwrite", "-o", images / "f.npz")
+    assert run(images, *masks).exit_code == 0
+    assert not beside[0].exists()
+
+
+def test_masks_that_were_named_stay_whatever_they_are_called(images):
+    own_masks(images)
+    (images / "own.png").rename(images / "f.ids.png")
+    masks = ("--masks", images / "f.ids.png", "--overwrite", "-o", images / "f.npz")
+    assert run(images, *masks).exit_code == 0
+    assert load_frame(images / "f.npz").object_ids == [3] and (images / "f.ids.png").is_file()
+
+
 def test_a_failure_is_one_message(images):
     np.save(images / "d.npy", np.full((HEIGHT, WIDTH), 800.0))
     arguments = ["--depth", str(images / "d.npy"), "-o", str(images / "f.npz"), "--segment"]

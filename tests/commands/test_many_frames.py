@@ -133,6 +133,7 @@ def test_units_and_masks_are_noted_for_the_first_frame_alone(source, tmp_path):
         (["--frames", "9:"], "none of the 4 frames"),
         (["--frames", ":", "--index", "1"], "exclude each other"),
         (["--frames", ":", "--view"], "--html"),
+        (["--frames", ":", "--masks", __file__], "--masks is of one frame, --frames of many"),
     ],
 )
 def test_what_does_not_go_with_many_frames_is_a_usage_error(arguments, says, source, tmp_path):
@@ -292,6 +293,7 @@ def test_a_frame_whose_masks_were_corrected_at_its_source_is_done_again(source, 
     assert (out / "f0.npz" / "object_7.ply").is_file()
     assert not (out / "f0.npz" / "object_1.ply").exists()
     assert not (out / "f0.npz" / "view.html").exists(), "it showed the masks before"
+    assert not (out / "f0.npz.masks.png").exists()
     assert (out / "f1.npz" / "object_1.ply").stat().st_mtime_ns == kept
     now = digests(out)
     assert now["f0.npz"] != first["f0.npz"] and now["f1.npz"] == first["f1.npz"]

@@ -116,6 +116,31 @@ def test_masks_that_are_given_are_used_and_a_page_may_stay_closed(
     assert not (tmp_path / "out.masks.png").exists()
 
 
+def test_masks_of_one_s_own_for_a_source_leave_no_picture_of_those_made_before(
+    images, sphere, tmp_path
+):
+    out, picture = tmp_path / "out", tmp_path / "out.masks.png"
+    assert run(images, "-o", out).exit_code == 0
+    assert picture.is_file()
+    one = np.asarray(Image.open(images / "m.png")) == 2
+    Image.fromarray(np.where(one, 5, 0).astype(np.uint8)).save(tmp_path / "own.png")
+    result = run(images, "--masks", tmp_path / "own.png", "-o", out, "--overwrite")
+    assert result.exit_code == 0, result.output
+    assert [path.name for path in out.glob("*.ply")] == ["object_5.ply"]
+    assert json.loads((out / "result.json").read_text())["segmentation"] is None
+    assert not picture.exists()
+    # Where masks are made again, so is their picture.
+    assert run(images, "-o", out, "--overwrite").exit_code == 0
+    assert picture.is_file()
+
+
+def test_the_picture_of_masks_of_another_folder_of_results_stays(images, sphere, tmp_path):
+    (tmp_path / "out.masks.png").write_text("mine")
+    result = run(*files(images), "--masks", images / "m.png", "-o", tmp_path / "out")
+    assert result.exit_code == 0, result.output
+    assert (tmp_path / "out.masks.png").read_text() == "mine"
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [

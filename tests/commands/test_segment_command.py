@@ -130,6 +130,17 @@ def test_wrong_corrections_are_told_and_write_nothing(saved, tmp_path, arguments
     assert not list(tmp_path.glob("g*"))
 
 
+def test_masks_of_one_s_own_are_taken_and_corrected(saved, tmp_path):
+    path, frame = saved
+    own = np.where(frame.segmap == 9, 2, np.where(frame.segmap > 0, 1, 0))
+    np.save(tmp_path / "own.npy", own)
+    masks = (path, "--masks", tmp_path / "own.npy", "-o", tmp_path / "g.npz")
+    result = run(*masks, "--drop", "2")
+    assert result.exit_code == 0, result.output
+    assert np.array_equal(load_frame(tmp_path / "g.npz").segmap, np.where(own == 1, 1, 0))
+    assert "exclude each other" in run(*masks, "--again", "--overwrite").output
+
+
 def test_nothing_is_overwritten_unasked(saved, tmp_path):
     path, _ = saved
     (tmp_path / "g.ids.png").write_text("mine")
