@@ -9,6 +9,8 @@ from typing import Any
 from brrp_cli.commands.beside import POSES
 from brrp_cli.files import parse_json, write_bytes
 from brrp_cli.progress import note
+from brrp_cli.results.bop import numbers_image
+from brrp_cli.results.write import RECORD
 
 SUMMARY = "frames.json"
 
@@ -49,15 +51,16 @@ def write_summary(
 
 
 def join_poses(output: Path, told: list[dict[str, Any]], every: list[str]) -> None:
-    """One BOP results file of all frames that have one. Where the names of two frames do not tell
-    different images, each has its place in the source as im_id."""
+    """One BOP results file of all frames that have one. Where the names of frames do not tell
+    different images, each frame has its place in the source as im_id."""
     paths = {each["frame"]: output / each["folder"] / POSES for each in told}
     texts = {name: path.read_text().splitlines() for name, path in paths.items() if path.is_file()}
     if not texts:
         return
     rows = {name: [row.split(",", 2) for row in text[1:]] for name, text in texts.items()}
     images = [key for each in rows.values() for key in {(scene, im) for scene, im, _ in each}]
-    if len(set(images)) < len(images):
+    numbered = all(numbers_image(_source(paths[name].parent)) for name in texts)
+    if not numbered or len(set(images)) < len(images):
         note(
             f"{POSES}: names tell no image numbers; im_id is a frame's place in the source, from 0"
         )
@@ -68,3 +71,11 @@ def join_poses(output: Path, told: list[dict[str, Any]], every: list[str]) -> No
     header = next(iter(texts.values()))[0]
     lines = [header, *(",".join(row) for each in rows.values() for row in each)]
     write_bytes(output / POSES, ("\n".join(lines) + "\n").encode())
+
+
+def _source(folder: Path) -> Path | None:
+    """What the results in a folder are of; None where they do not tell."""
+    try:
+        return Path(parse_json((folder / RECORD).read_text(encoding="utf-8"))["source"])
+    except (OSError, ValueError, KeyError, TypeError):
+        return None

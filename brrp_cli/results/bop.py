@@ -35,9 +35,18 @@ def bop_id(name: str, names: Sequence[str]) -> int:
 
 def image_ids(source: Path | None) -> tuple[int, int]:
     """Scene and image of a frame, from the last two numbers of its path; 0 where there is none."""
-    numbers = [int(part) for part in re.findall(r"(?<!\d)(\d{4,6})(?!\d)", str(source or ""))]
-    scene, image = ([0, 0, *numbers])[-2:]
+    scene, image = ([0, 0, *_numbers(str(source or ""))])[-2:]
     return scene, image
+
+
+def numbers_image(source: Path | None) -> bool:
+    """Whether a frame's own name holds the number that `image_ids` takes for its image: one of a
+    folder above it, such as a year, is the same for all its frames."""
+    return source is not None and bool(_numbers(source.name))
+
+
+def _numbers(text: str) -> list[int]:
+    return [int(part) for part in re.findall(r"(?<!\d)(\d{4,6})(?!\d)", text)]
 
 
 def bop_rows(record: Mapping[str, Any], names: Sequence[str]) -> list[tuple[str, ...]]:

@@ -210,6 +210,23 @@ def test_poses_of_frames_that_are_named_by_words_have_images_of_their_own(tmp_pa
     assert lines == [header, *[row] * 2, *[row.replace("0,0,", "0,2,", 1)] * 2]
 
 
+@pytest.mark.parametrize(
+    ("source", "scene", "image"), [("2024/b.npz", 0, 1), ("bop/000048/000003", 48, 3)]
+)
+def test_poses_of_a_single_frame_have_its_place_unless_it_is_numbered(
+    source, scene, image, tmp_path
+):
+    header, row = "scene_id,im_id,obj_id,score,R,t,time", "4,0.9,1 0 0,1 2 3,0.5"
+    (tmp_path / "b").mkdir()
+    told = [{"frame": name, "folder": name} for name in ("a", "b")]
+    (tmp_path / "b" / "result.json").write_text(json.dumps({"source": source}))
+    ids = "0,2024" if scene == 0 else f"{scene},{image}"
+    (tmp_path / "b" / "poses_bop.csv").write_text(f"{header}\n{ids},{row}\n")
+    join_poses(tmp_path, told, ["a", "b"])
+    lines = (tmp_path / "poses_bop.csv").read_text().splitlines()
+    assert lines == [header, f"{scene},{image},{row}"]
+
+
 def test_settings_that_differ_are_named_with_their_values(source, tmp_path):
     out = tmp_path / "out"
     assert run(source, "--frames", ":1", "-o", out).exit_code == 0

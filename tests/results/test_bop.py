@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from brrp_cli.geometry import similarity
-from brrp_cli.results.bop import bop_csv, bop_id, image_ids
+from brrp_cli.results.bop import bop_csv, bop_id, image_ids, numbers_image
 from brrp_cli.results.write import result_record
 
 
@@ -29,6 +29,20 @@ def test_numbers_of_objects(name: str, number: int) -> None:
 def test_scene_and_image_come_from_the_path() -> None:
     assert image_ids(Path("ycbv/test/000048/rgb/000001.png")) == (48, 1)
     assert image_ids(Path("frame.npz")) == (0, 0) and image_ids(None) == (0, 0)
+
+
+@pytest.mark.parametrize(
+    ("source", "numbered"),
+    [
+        ("ycbv/test/000048/000000", True),
+        ("scene_0007/rgb/0003.png", True),
+        ("2024/frames/f1.npz", False),
+        ("f1.npz", False),
+    ],
+)
+def test_whether_a_frame_s_own_name_numbers_its_image(source: str, numbered: bool) -> None:
+    assert numbers_image(Path(source)) is numbered
+    assert not numbers_image(None)
 
 
 def test_a_row_for_each_recognised_object(made_reconstruction) -> None:
