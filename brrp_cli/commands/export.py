@@ -71,10 +71,9 @@ CONFIDENCE = click.FloatRange(0.5, 0.999)
 )
 @click.option(
     "--rest/--no-rest",
-    default=True,
-    show_default=True,
+    default=None,
     help="Move objects, as little as it takes, to where they rest in a simulation. Not with "
-    "--confidence.",
+    "--confidence. [default: rest, without --confidence]",
 )
 @click.option("--seed", type=SEED, default=0, show_default=True, help=SEED_HELP)
 @json_option
@@ -88,7 +87,7 @@ def command(
     density: float,
     moveit: bool,
     frame_id: str | None,
-    rest: bool,
+    rest: bool | None,
     seed: int,
     as_json: bool,
     overwrite: bool,
@@ -107,6 +106,11 @@ def command(
     """
     if margin and confidence is None:
         raise click.UsageError("--margin grows the shapes of --confidence, so give both")
+    if rest and confidence is not None:
+        raise click.UsageError(
+            "--rest and --confidence exclude each other: shapes that hold objects with a"
+            " probability hold them where they were measured"
+        )
     if frame_id is not None and not moveit:
         raise click.UsageError("--frame-id is of the planning scene of --moveit, so give both")
     require_results(results)
@@ -114,7 +118,9 @@ def command(
     from brrp_cli.api import open_result
 
     scene = (frame_id or "") if moveit else None
-    options = PlanOptions(collision, confidence, margin / 1000, density, seed, scene, rest)
+    options = PlanOptions(
+        collision, confidence, margin / 1000, density, seed, scene, rest is not False
+    )
     check_libraries(options)
     with report_of(as_json) as report:
         record = export(open_result(results), output, options, overwrite=overwrite)

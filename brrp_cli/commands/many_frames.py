@@ -261,13 +261,16 @@ def one_line(name: str, table: list[Told], seconds: float) -> str:
 def _folders(names: list[str], output: Path) -> dict[str, Path]:
     """Frame -> folder. Errors: OutputError where two would have one."""
     folders = {name: output / folder_name(name) for name in names}
-    if len(set(folders.values())) < len(folders):
-        raise OutputError(
-            "Two frames would have one folder",
-            where=output,
-            found=", ".join(names[:8]),
-            fix="choose fewer with --frames",
-        )
+    first: dict[Path, str] = {}
+    for name, folder in folders.items():
+        other = first.setdefault(folder, name)
+        if other != name:
+            raise OutputError(
+                "Two frames would have one folder",
+                where=folder,
+                found=f"{other} and {name}",
+                fix="rename one of them, or choose fewer with --frames",
+            )
     return folders
 
 

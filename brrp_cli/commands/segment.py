@@ -15,6 +15,7 @@ from brrp_cli.commands.method_options import CONFIG_HELP
 from brrp_cli.commands.output_file import require_suffix
 from brrp_cli.commands.seed_option import SEED, SEED_HELP
 from brrp_cli.commands.source_options import SourceOptions, require_output, source_options
+from brrp_cli.errors import FrameError
 from brrp_cli.files import refuse_existing
 from brrp_cli.progress import note
 
@@ -105,7 +106,7 @@ def command(
     source.check()
     output = require_output(output)
     require_suffix(output, ".npz")
-    if any(len(ids) < 2 for ids in merges):
+    if any(len({*ids}) < 2 for ids in merges):
         raise click.UsageError("--merge takes two ids or more: --merge 3,4")
     named = Counter(i for group in [*merges, *drops] for i in {*group})
     if twice := [str(i) for i, times in named.items() if times > 1]:
@@ -139,8 +140,19 @@ def command(
         frame = edit_masks.corrected(frame, split)
     for group in merges:
         frame = edit_masks.corrected(frame, edit_masks.merge(frame, group))
+    undropped = frame
     for group in drops:
         frame = edit_masks.corrected(frame, edit_masks.drop(frame, group))
+    if undropped.object_ids and not frame.object_ids:
+        raise FrameError(
+            "There is no object in the mask any more",
+            where=frame.source,
+            expected="at least one object that is not dropped",
+            found=f"--drop takes all {len(undropped.object_ids)}"
+            if len(undropped.object_ids) > 1
+            else "--drop takes the only one",
+            fix="drop fewer, or make new masks with --again",
+        )
     with report_of(as_json) as report:
         report["objects"] = _report(require_objects(frame), before)
         write_picture(frame, picture)

@@ -186,6 +186,15 @@ def test_what_is_asked_for_later_is_written_beside_what_was_there(source, tmp_pa
     assert json.loads((out / "f0.npz" / "plan" / "plan.json").read_text())["confidence"] == 0.9
 
 
+def test_of_two_frames_with_one_folder_both_are_named(source, tmp_path):
+    for name in ("g 1.npz", "g_1.npz"):
+        shutil.copy(source / "f0.npz", source / name)
+    result = run(source, "--frames", ":", "-o", tmp_path / "out")
+    assert result.exit_code == 1 and "found:    g 1.npz and g_1.npz" in result.output
+    assert f"where:    {tmp_path / 'out' / 'g_1.npz'}" in result.output
+    assert run(source, "--frames", ":2", "-o", tmp_path / "out").exit_code == 0
+
+
 def test_what_was_told_of_other_frames_stays(source, tmp_path):
     out = tmp_path / "out"
     assert run(source, "--frames", "3:", "-o", out).exit_code == 0

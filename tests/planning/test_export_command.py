@@ -273,6 +273,11 @@ def test_refuses_what_it_cannot_do(results, tmp_path):
     assert run(results, "--density", 0)[0] == 2
     code, output = run(results, "--margin", 10)
     assert code == 2 and "--confidence" in output
+    held = ("--confidence", 0.95, "--collision", "hull", "-o", tmp_path / "held")
+    code, output = run(results, *held, "--rest")
+    assert code == 2 and "--rest and --confidence exclude each other" in output
+    assert not (tmp_path / "held").exists()
+    assert run(results, *held, "--no-rest")[0] == 0
 
 
 def test_without_coacd_it_says_what_to_install(results, tmp_path, monkeypatch):
