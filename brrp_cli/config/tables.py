@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import json
 import math
 import types
 from collections.abc import Mapping
 from dataclasses import MISSING, Field, asdict, fields, is_dataclass, replace
-from typing import Any, TypeVar, Union, get_args, get_origin, get_type_hints
+from typing import Any, NamedTuple, TypeVar, Union, get_args, get_origin, get_type_hints
 
 from brrp_cli.config.ranges import LEAST, MOST
 from brrp_cli.errors import ConfigError
@@ -27,8 +28,8 @@ def changed(config: T, table: Mapping[str, Any], source: object, inside: str = "
     for key, value in table.items():
         if key not in known:
             raise unknown_key(source, inside + key, inside, known)
-        place = f"{source}: {inside}{key}"
         kind, current = kinds[key], getattr(config, key)
+        place = _Place(f"{source}: {inside}{key}", _advice(inside + key, current))
         nested = _dataclass_of(kind)
         if nested is None:
             values[key] = _value(value, kind, known[key], place)
@@ -36,19 +37,41 @@ def changed(config: T, table: Mapping[str, Any], source: object, inside: str = "
             start = nested() if current is None else current
             values[key] = changed(start, value, source, f"{inside}{key}.")
         else:
-            raise _refused(place, f"a table [{inside}{key}]", value)
+            advice = f"write its keys below a line [{inside}{key}]"
+            raise _refused(place._replace(advice=advice), f"a table [{inside}{key}]", value)
     return replace(config, **values)  # type: ignore[type-var]
 
 
-def unknown_key(source: object, key: str, inside: str, known: Mapping[str, Any]) -> ConfigError:
-    """The message for a key that is not there, with the one that was meant."""
+class _Place(NamedTuple):
+    """Where a value stands: file and key; and what to do if it cannot be used."""
+
+    where: str
+    advice: str
+
+
+def _advice(key: str, current: Any) -> str:
+    """What to do about a value that cannot be used, and what stands for it if it is left out."""
+    text = f"give {key} such a value, or leave it out"
+    if current is None or is_dataclass(current):
+        return text
+    kept = list(current) if isinstance(current, tuple) else current
+    return f"{text}: it is {json.dumps(kept)} then"  # as TOML writes it
+
+
+def unknown_key(
+    source: object, key: str, inside: str, known: Mapping[str, Any], of_other: str | None = None
+) -> ConfigError:
+    """The message for a key that is not there, with the one that was meant, or else what is told of
+    one `of_other` configurations."""
     meant = most_similar_name(key.removeprefix(inside), known)
     return ConfigError(
         "The configuration has no such key",
         where=f"{source}: {key}",
         expected=", ".join(inside + name for name in known),
         found=key,
-        fix=f"did you mean {inside + meant}?" if meant else "brrp config show prints every key",
+        fix=f"did you mean {inside + meant}?"
+        if meant
+        else of_other or "brrp config show prints every key",
     )
 
 
@@ -69,7 +92,7 @@ def _dataclass_of(kind: Any) -> Any:
     return next((each for each in options if is_dataclass(each)), None)
 
 
-def _value(value: Any, kind: Any, field: Field[Any], place: str) -> Any:
+def _value(value: Any, kind: Any, field: Field[Any], place: _Place) -> Any:
     if get_origin(kind) is not tuple:
         return _scalar(value, kind, field, place)
     inner = get_args(kind)
@@ -80,7 +103,7 @@ def _value(value: Any, kind: Any, field: Field[Any], place: str) -> Any:
     return tuple(_scalar(each, inner[0], field, place) for each in value)
 
 
-def _scalar(value: Any, kind: Any, field: Field[Any], place: str) -> Any:
+def _scalar(value: Any, kind: Any, field: Field[Any], place: _Place) -> Any:
     """The value, of the field's type and in its range."""
     if kind in (bool, str):
         if not isinstance(value, kind):
@@ -112,10 +135,11 @@ def _range(field: Field[Any]) -> tuple[float, float, bool]:
     return 0.0, math.inf, lowest == 0
 
 
-def _refused(place: str, expected: str, found: object) -> ConfigError:
+def _refused(place: _Place, expected: str, found: object) -> ConfigError:
     return ConfigError(
         "The configuration has a value that cannot be used",
-        where=place,
+        where=place.where,
         expected=expected,
         found=f"{found!r:.80}",
+        fix=place.advice,
     )

@@ -16,7 +16,7 @@ config show` prints all keys with their values.
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any
@@ -26,6 +26,8 @@ from brrp_cli.config.tables import changed, plain, unknown_key
 from brrp_cli.errors import BrrpError, ConfigError
 from brrp_cli.methods.base import Method
 from brrp_cli.methods.registry import DEFAULT, METHODS
+from brrp_cli.similar_names import most_similar_name
+from brrp_cli.spoken import option
 
 METHOD, PRESET, SEGMENTATION = "method", "preset", "segmentation"
 
@@ -47,6 +49,7 @@ class ConfigFile:
                 where=f"{self.path}: {METHOD}",
                 expected=", ".join(METHODS),
                 found=name,
+                fix=_meant(name, METHODS),
             )
         return str(name)
 
@@ -63,6 +66,7 @@ class ConfigFile:
                 where=f"{self.path}: {METHOD}",
                 expected=method.name,
                 found=self.method,
+                fix=f"choose its method with {option('method', self.method)}, or give another file",
             )
         try:
             start = method.preset(preset or self.table.get(PRESET))
@@ -72,13 +76,14 @@ class ConfigFile:
                 where=f"{self.path}: {PRESET}",
                 expected=", ".join(method.presets),
                 found=self.table.get(PRESET),
+                fix=_meant(self.table.get(PRESET), method.presets),
             ) from error
         known = {each.name: None for each in fields(start)}
         own = {k: v for k, v in self.table.items() if k not in (METHOD, PRESET, SEGMENTATION)}
         for key in own:
             if key not in known:
                 every = {METHOD: None, PRESET: None, **known, SEGMENTATION: None}
-                raise unknown_key(self.path, key, "", every)
+                raise unknown_key(self.path, key, "", every, _of_other(key))
         self.segmentation()
         return changed(start, own, self.path)
 
@@ -93,6 +98,20 @@ class _Masks:
     segmentation: SegmentConfig = field(default_factory=SegmentConfig)
 
 
+def _meant(name: object, known: Iterable[str]) -> str:
+    """Advice for a name that is none of those that are known."""
+    meant = most_similar_name(str(name), known)
+    return f"did you mean {meant}?" if meant else "write one of these names"
+
+
+def _of_other(key: str) -> str | None:
+    """Advice for a key that only other methods know; None for one that none knows."""
+    for name, method in METHODS.items():
+        if any(key in {each.name for each in fields(one)} for one in method.presets.values()):
+            return f"it is a key of another method: {option('method', name)}"
+    return None
+
+
 def read_config(path: str | Path) -> ConfigFile:
     """Read a file. Errors: ConfigError if it is missing or no TOML."""
     path = Path(path)
@@ -104,6 +123,9 @@ def read_config(path: str | Path) -> ConfigFile:
             where=path,
             expected="a TOML file, such as brrp config show prints",
             found=error.strerror if isinstance(error, OSError) else error,
+            fix="check the path"
+            if isinstance(error, OSError)
+            else "mend that place; texts stand in quotes, as brrp config show prints them",
         ) from error
 
 

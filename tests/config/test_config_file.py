@@ -110,6 +110,37 @@ def test_what_is_wrong_is_told_with_file_and_key(tmp_path, wrong):
         load_config(path)
     assert str(path) in str(error.value.where) and str(error.value.where).endswith(key)
     assert told in f"{error.value.expected} {error.value.fix}"
+    assert error.value.fix
+
+
+FIXES = {
+    "range": ("[surface]\nspacing = -1", "give surface.spacing such a value, or leave it out: "),
+    "kept": ("[surface]\nspacing = -1", "it is 0.005 then"),
+    "table": ("surface = 0.4", "write its keys below a line [surface]"),
+    "another method's": ("gamma = 3.0", "it is a key of another method: method=vprism"),
+    "no method's": ("zzz = 3.0", "brrp config show prints every key"),
+    "method": ("method = 'vprism'", "choose its method with method=vprism"),
+    "unknown method": ("method = 'vprsm'", "did you mean vprism?"),
+    "preset": ("preset = 'papre'", "did you mean paper?"),
+    "far preset": ("preset = 3", "write one of these names"),
+    "no TOML": ("k = = 3", "mend that place"),
+}
+
+
+@pytest.mark.parametrize("wrong", FIXES)
+def test_how_to_mend_it_is_told(tmp_path, wrong):
+    text, fix = FIXES[wrong]
+    with pytest.raises(ConfigError) as error:
+        load_config(written(tmp_path, text))
+    assert fix in str(error.value.fix)
+    with pytest.raises(ConfigError, match="check the path"):
+        read_config(tmp_path / "none.toml")
+
+
+def test_the_way_out_is_told_as_it_is_typed(tmp_path):
+    path = written(tmp_path, "gamma = 3.0\n")
+    done = CliRunner().invoke(main, ["config", "show", "--config", str(path)])
+    assert done.exit_code == 1 and "it is a key of another method: --method vprism" in done.output
 
 
 def test_the_one_that_was_meant_is_named(tmp_path):
