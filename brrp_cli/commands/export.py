@@ -169,7 +169,7 @@ def export(
 def told(item: dict[str, Any]) -> str:
     """One object's numbers for people."""
     count, rest = len(item["parts"]), item["rest"]
-    text = f"{count} part{'s' if count > 1 else ''}, {item['mass'] * 1000:.0f} g"
+    text = f"{counted(count, 'part')}, {item['mass'] * 1000:.0f} g"
     if rest is not None:
         text += f", put to rest {rest['moved_mm']:.1f} mm and {rest['turned_degrees']:.1f}° away"
         if rest["foot_mm"]:

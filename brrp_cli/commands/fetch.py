@@ -16,6 +16,7 @@ from brrp_cli.segmentation.prompted.mask_files import (
     masks_folder,
     read_mask_manifest,
 )
+from brrp_cli.spoken import agreed, counted
 
 PRECISIONS = {"clip": CLIP_PRECISIONS, "masks": MASK_PRECISIONS}
 MESHES = ("ycb", "household")
@@ -111,7 +112,7 @@ def _clip(precision: str, clip_dir: Path | None, source: str | None) -> None:
     ClipTokenizer(find_clip_files(folder).tokenizer)
     size = sum(file.bytes for file in files) / 1e6
     click.echo(
-        f"CLIP ViT-B/16, {precision}, {size:.0f} MB: {len(brought)} files fetched, "
+        f"CLIP ViT-B/16, {precision}, {size:.0f} MB: {counted(len(brought), 'file')} fetched, "
         f"{len(files) - len(brought)} there already, all checked: {folder}"
     )
 
@@ -128,7 +129,8 @@ def _masks(precision: str, masks_dir: Path | None, source: str | None) -> None:
     find_mask_files(folder)
     size = sum(file.bytes for file in files) / 1e6
     click.echo(
-        f"Grounding DINO tiny, {precision}, and MobileSAM, {size:.0f} MB: {brought} files fetched, "
+        f"Grounding DINO tiny, {precision}, and MobileSAM, {size:.0f} MB:"
+        f" {counted(brought, 'file')} fetched, "
         f'{len(files) - brought} there already, all checked: {folder}. Use: --prompt "small object"'
     )
 
@@ -142,14 +144,16 @@ def _meshes(what: str, out: Path | None, source: str | None) -> None:
     folder = out or data_folder() / "meshes" / what
     fetched = fetch_meshes(meshes, source, folder)
     if fetched.unchecked:
+        several = len(fetched.unchecked)
         note(
-            f"{len(fetched.unchecked)} textures have no known sum and were taken as they came, "
-            f"such as {fetched.unchecked[0]}"
+            f"{counted(several, 'texture')} {agreed(several, 'has', 'have')} no known sum and"
+            f" {agreed(several, 'was', 'were')} taken unchecked, such as {fetched.unchecked[0]}"
         )
     size = sum(file.bytes for file in meshes.files) / 1e6
     there = len(meshes.files) - len(fetched.brought)
     click.echo(
-        f"{meshes.title} ({meshes.licence}), {size:.0f} MB: {len(fetched.brought)} files fetched, "
+        f"{meshes.title} ({meshes.licence}), {size:.0f} MB:"
+        f" {counted(len(fetched.brought), 'file')} fetched, "
         f"{there} there already, {'' if fetched.unchecked else 'all '}checked: {folder}. "
         f"Use: brrp build-prior {quote(str(folder))}"
     )

@@ -116,7 +116,9 @@ def run_many(work: Work, frames: slice, output: Path, report: dict[str, Any]) ->
     every = work.source.names()
     chosen = every[frames]
     if not chosen:
-        raise click.UsageError(f"--frames chooses none of the {len(every)} frames of the source")
+        raise click.UsageError(
+            f"--frames chooses none of the {counted(len(every), 'frame')} of the source"
+        )
     folders = _folders(chosen, output)
     there = {
         name: stored

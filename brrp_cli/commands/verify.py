@@ -37,7 +37,7 @@ def command(prior: Path | None, as_json: bool) -> None:
     with report_of(as_json) as report:
         for problem in problems:
             click.echo(problem)
-        found = f"{len(problems)} problems" if problems else "all is well"
+        found = counted(len(problems), "problem") if problems else "all is well"
         click.echo(f"{folder} ({how}): {counts}, {found}")
         report["path"] = str(folder)
         report["objects"] = len(opened.names)

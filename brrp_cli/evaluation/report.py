@@ -14,6 +14,7 @@ from brrp_cli.evaluation.report_written import WRITTEN_NOTES, written_sections
 from brrp_cli.evaluation.rows import STAGES
 from brrp_cli.evaluation.summary import VariantSummary
 from brrp_cli.evaluation.variants import Variant
+from brrp_cli.spoken import counted
 
 Labels = Mapping[Variant, str]
 Differences = Mapping[tuple[Variant, Variant], Mapping[str, Interval]]
@@ -90,7 +91,7 @@ def write_report(
 ) -> str:
     """The text of report.md. `record`: what run.json and summary.json say of the run."""
     parts = [
-        f"# Evaluation of {record['scenes_total']} scenes",
+        f"# Evaluation of {counted(record['scenes_total'], 'scene')}",
         _facts(record),
         *written_sections(summaries, labels),
     ]

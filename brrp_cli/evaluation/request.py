@@ -38,6 +38,7 @@ from brrp_cli.prior.store import Prior
 from brrp_cli.progress import progress
 from brrp_cli.retrieval.choose import USE_CLIP, resolve_name
 from brrp_cli.retrieval.clip.model_files import clip_folder, need_clip_folder
+from brrp_cli.spoken import counted
 from brrp_cli.stop import stopped
 from brrp_cli.version import __version__
 
@@ -113,7 +114,8 @@ def evaluate(request: Request, say: Callable[[str], None] = lambda text: None) -
             )
     for variant in variants:
         if opened is not None and variant.k is not None and variant.k > len(opened.names):
-            say(f"--k {variant.k}: the prior holds {len(opened.names)} objects, all are taken")
+            held = counted(len(opened.names), "object")
+            say(f"--k {variant.k}: the prior holds {held}, all are taken")
     labels = short_labels(variants)
     plan = Plan(
         scenes=scenes,
@@ -132,7 +134,7 @@ def evaluate(request: Request, say: Callable[[str], None] = lambda text: None) -
         open_executor(request.workers, request.scheduler) as executor,
         claimed(request.output, parameters, overwrite=request.overwrite) as path,
     ):
-        say(f"{len(scenes)} scenes, {executor.title}: {', '.join(labels.values())}")
+        say(f"{counted(len(scenes), 'scene')}, {executor.title}: {', '.join(labels.values())}")
         log = RowLog(path)
         lost: dict[str, str] = {}
         todo = remaining(plan, log)

@@ -25,6 +25,7 @@ from brrp_cli.executors.cluster_task import Job, MachineFault, work
 from brrp_cli.executors.processes import cannot_start
 from brrp_cli.executors.shared_folder import token
 from brrp_cli.progress import note
+from brrp_cli.spoken import counted
 
 # Tasks that are out beyond one for each worker thread, so that no worker waits for this process.
 AHEAD = 2
@@ -65,7 +66,7 @@ def open_cluster(scheduler: str) -> Iterator[Cluster]:
         local = _LOCAL.fullmatch(scheduler)
         if local:
             client, revive = stack.enter_context(_local(int(local[1])))
-            title = f"{local[1]} Dask workers on this machine"
+            title = f"{counted(int(local[1]), 'Dask worker')} on this machine"
         else:
             # Elsewhere Dask's nannies, or what started the cluster, replace workers.
             revive = None

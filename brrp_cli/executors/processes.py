@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import Any
 
 from brrp_cli.errors import BrrpError, unexpected
+from brrp_cli.spoken import counted
 
 # Seconds that a worker which is to stop may take to end by itself.
 PATIENCE = 5.0
@@ -34,7 +35,7 @@ class Processes:
 
     def __init__(self, workers: int) -> None:
         self.workers = workers
-        self.title = f"{workers} workers"
+        self.title = counted(workers, "worker")
 
     def run(
         self,

@@ -59,6 +59,7 @@ def test_verify_passes_then_lists_the_damage(built: tuple[Path, Result]) -> None
     shard.write_bytes(whole)
     assert result.exit_code == 1
     assert f"1000 bytes in place of {len(whole)}" in result.stdout
+    assert ", 1 problem\n" in result.stdout
 
 
 def test_the_prior_is_found_through_the_environment(

@@ -123,7 +123,7 @@ def test_ycb_with_a_png_says_what_is_not_checked(tmp_path: Path) -> None:
         again = brrp_fetch("ycb", "--from", address, "-o", out)
     assert result.exit_code == 0, result.stderr
     assert held(out) == AS_PNG
-    assert "1 textures have no known sum" in result.stderr
+    assert "1 texture has no known sum and was taken unchecked" in result.stderr
     assert "0 files fetched" in again.stdout
 
 

@@ -17,6 +17,7 @@ from brrp_cli.segmentation.prompted.mask_files import find_mask_files
 from brrp_cli.segmentation.prompted.segmenter import Segmenter
 from brrp_cli.segmentation.smooth_depth import flying_pixels
 from brrp_cli.segmentation.table_plane import find_table
+from brrp_cli.spoken import counted
 
 log = logging.getLogger(__name__)
 
@@ -102,7 +103,7 @@ def layered(
             "The prompt found nothing that stands out of the table",
             where=frame.source,
             expected="objects that the phrase names, with depth",
-            found=f"{len(masks)} masks, none of which is left after the depth filters",
+            found=f"{counted(len(masks), 'mask')}, none of which is left after the depth filters",
             fix="try other words, or --segment, which needs none",
         )
     segmap = np.zeros(frame.shape, np.int64)
