@@ -50,16 +50,21 @@ def write_summary(
     write_bytes(output / SUMMARY, (json.dumps(table, indent=1) + "\n").encode())
 
 
-def join_poses(output: Path, told: list[dict[str, Any]], every: list[str]) -> None:
+def join_poses(
+    output: Path, told: list[dict[str, Any]], every: list[str], source: Path | None = None
+) -> None:
     """One BOP results file of all frames that have one. Where the names of frames do not tell
-    different images, each frame has its place in the source as im_id."""
+    different images, each frame has its place among `every` of the source as im_id."""
     paths = {each["frame"]: output / each["folder"] / POSES for each in told}
     texts = {name: path.read_text().splitlines() for name, path in paths.items() if path.is_file()}
     if not texts:
         return
     rows = {name: [row.split(",", 2) for row in text[1:]] for name, text in texts.items()}
     images = [key for each in rows.values() for key in {(scene, im) for scene, im, _ in each}]
-    numbered = all(numbers_image(_source(paths[name].parent)) for name in texts)
+    sources = {_source(paths[name].parent) for name in texts}
+    # The name of a bag is no frame's own.
+    own = len(every) == 1 or source not in sources
+    numbered = own and all(map(numbers_image, sources))
     if not numbered or len(set(images)) < len(images):
         note(
             f"{POSES}: names tell no image numbers; im_id is a frame's place in the source, from 0"

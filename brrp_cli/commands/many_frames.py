@@ -169,7 +169,7 @@ def run_many(work: Work, frames: slice, output: Path, report: dict[str, Any]) ->
                 stack.enter_context(hushed())
                 first = False
     write_summary(output, source, settings, summary)
-    join_poses(output, summary, every)
+    join_poses(output, summary, every, work.source.path)
     count = {status: sum(a["status"] == status for a in told) for status in (DONE, FAILED, SKIPPED)}
     say(
         f"Wrote {count[DONE]} of {counted(len(chosen), 'frame')}"

@@ -220,7 +220,8 @@ def test_poses_of_frames_that_are_named_by_words_have_images_of_their_own(tmp_pa
 
 
 @pytest.mark.parametrize(
-    ("source", "scene", "image"), [("2024/b.npz", 0, 1), ("bop/000048/000003", 48, 3)]
+    ("source", "scene", "image"),
+    [("2024/b.npz", 0, 1), ("bop/000048/000003", 48, 3), ("2024-05-12.bag", 0, 1)],
 )
 def test_poses_of_a_single_frame_have_its_place_unless_it_is_numbered(
     source, scene, image, tmp_path
@@ -231,7 +232,7 @@ def test_poses_of_a_single_frame_have_its_place_unless_it_is_numbered(
     (tmp_path / "b" / "result.json").write_text(json.dumps({"source": source}))
     ids = "0,2024" if scene == 0 else f"{scene},{image}"
     (tmp_path / "b" / "poses_bop.csv").write_text(f"{header}\n{ids},{row}\n")
-    join_poses(tmp_path, told, ["a", "b"])
+    join_poses(tmp_path, told, ["a", "b"], Path("2024-05-12.bag"))
     lines = (tmp_path / "poses_bop.csv").read_text().splitlines()
     assert lines == [header, f"{scene},{image},{row}"]
 
