@@ -61,12 +61,12 @@ class ColourConfig:
     The best placement is turned about each axis of its box and of its own in `turns` steps, both
     ways up; the best are placed again, first those that are turned by `apart` radians from all
     better ones. Of those whose alignment score is within `alike` of its own the one with the best
-    sum of alignment score and `worth` times the correlation of colours is taken, if that gains
-    `gain`: a box that one buys is not quite the one that was scanned. It counts in full from a
-    standard deviation of `textured` (of 255) on. Colours are means over cells of `cell` metres, of
-    at most `vertices` vertices, of which `least_seen` have to be within `near` metres of the
-    measured depth; what differs by less than `plain` (of 255) is of one colour. asked : whether any
-    of this is done
+    sum of alignment score and `worth` times the correlation of what is printed is taken, if that
+    gains `gain`: a box that one buys is not quite the one that was scanned. It counts in full from
+    a standard deviation of `printed` (of 255) on, and not at all under `unprinted`. Colours are
+    means over cells of `cell` metres, of at most `vertices` vertices, of which `least_seen` have to
+    be within `near` metres of the measured depth; as evidence for an object, what differs by less
+    than `plain` (of 255) is of one colour. asked : whether any of this is done
     """
 
     asked: bool = True
@@ -75,7 +75,8 @@ class ColourConfig:
     alike: float = 0.2
     worth: float = 1.0
     gain: float = 0.05
-    textured: float = 30.0
+    printed: float = 12.0
+    unprinted: float = 3.0
     cell: float = 0.012
     vertices: int = 4000
     least_seen: int = 40

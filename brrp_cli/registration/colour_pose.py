@@ -1,7 +1,8 @@
 """Which of the placements that look alike in depth has the colours that the camera saw.
 
 A box is the same from its front and its back, a can whichever way it is turned: depth cannot tell,
-and colour can.
+and colour can. Light makes one side of it darker than the other, and may have fallen from elsewhere
+when the object was scanned: how bright a side is as a whole tells nothing of how it is turned.
 """
 
 from __future__ import annotations
@@ -25,6 +26,9 @@ Array = NDArray[np.float64]
 # Lengths of principal axes in this ratio or less are alike; axes that are turned from the box's by
 # less, radians, are the box's.
 ALIKE, ASKEW = 1.05, 0.05
+# Brightness, red against green, both against blue: unit vectors at right angles.
+_OPPONENT = np.array([[1.0, 1.0, 1.0], [1.0, -1.0, 0.0], [0.5, 0.5, -1.0]])
+_OPPONENT /= np.linalg.norm(_OPPONENT, axis=1, keepdims=True)
 
 
 @cache
@@ -90,36 +94,54 @@ def colour_agreement(
     config: ColourConfig,
     lost: NDArray[np.bool_] | None = None,
 ) -> float:
-    """Correlation of the colours that are stored and seen: see `_compared`."""
-    return _compared(T_cam_model, model, frame, config, lost)[0]
+    """Correlation, -1 to 1, of the stored colours of what faces the camera, placed by T_cam_model
+    (4, 4), with the image's at the same pixels; each channel about its own mean, so that the
+    light's brightness and hue do not count. 0 where there is too little to see, or nothing but one
+    colour.
+
+    lost : (H, W) pixels of the object that have no depth, where that alone would be too few"""
+    seen = _seen(T_cam_model, model, frame, config, lost)
+    if seen is None:
+        return 0.0
+    return _correlation(seen.stored, seen.image, seen.cell, config.plain)[0]
 
 
-def textured_agreement(
+def print_agreement(
     T_cam_model: Array,
     model: Model,
     frame: Frame,
     config: ColourConfig,
     lost: NDArray[np.bool_] | None = None,
 ) -> float:
-    """The same, less where there is little to compare: on a plain thing light and shadow decide."""
-    correlation, contrast = _compared(T_cam_model, model, frame, config, lost)
-    return correlation * min(1.0, contrast / config.textured) ** 2
+    """The same of what is printed on it: how bright a side of its box is as a whole does not count.
+    Less where there is little to compare: on a plain thing light and shadow decide."""
+    seen = _seen(T_cam_model, model, frame, config, lost)
+    if seen is None:
+        return 0.0
+    stored, image = (_unshaded(each, seen.side) for each in (seen.stored, seen.image))
+    correlation, contrast = _correlation(stored, image, seen.cell, config.unprinted)
+    return correlation * min(1.0, contrast / config.printed) ** 2
 
 
-def _compared(
+@dataclass(frozen=True)
+class _Seen:
+    """Vertices that the camera sees: stored and image (n, 3), their colours; cell (n,) of the
+    surface; side (n,), 0 to 5, of the box that they face."""
+
+    stored: Array
+    image: Array
+    cell: NDArray[np.int64]
+    side: NDArray[np.int64]
+
+
+def _seen(
     T_cam_model: Array,
     model: Model,
     frame: Frame,
     config: ColourConfig,
     lost: NDArray[np.bool_] | None,
-) -> tuple[float, float]:
-    """Correlation, -1 to 1, of the stored colours of what faces the camera, placed by T_cam_model
-    (4, 4), with the image's at the same pixels; each channel about its own mean, so that the
-    light's brightness and hue do not count. Both are means over cells of the surface: letters lie
-    a little elsewhere. 0 where there is too little to see, or nothing but one colour. And the
-    standard deviation of the stored colours, of 255.
-
-    lost : (H, W) pixels of the object that have no depth, where that alone would be too few"""
+) -> _Seen | None:
+    """Of a model placed by T_cam_model (4, 4); None where these are too few."""
     sample = _sampled(model.stored.shape, model.stored.half_extent, config.vertices, config.cell)
     # In the model's axes, where its normals are the same for all placements.
     camera = np.linalg.inv(T_cam_model)[:3, 3]
@@ -132,17 +154,36 @@ def _compared(
         shown |= lost.ravel()[pixel]
     near = np.flatnonzero(inside & shown)
     if len(near) < config.least_seen:
-        return 0.0, 0.0
-    seen = facing[near]
-    cell = sample.cell[seen]
+        return None
+    rows = facing[near]
+    return _Seen(
+        sample.colours[rows].astype(np.float64),
+        frame.rgb.reshape(-1, 3)[pixel[near]].astype(np.float64),
+        sample.cell[rows],
+        sample.side[rows],
+    )
+
+
+def _unshaded(colours: Array, side: NDArray[np.int64]) -> Array:
+    """Colours (n, 3) as brightness, about the mean of each side (n,), and two of hue."""
+    found = colours @ _OPPONENT.T
+    bright = np.bincount(side, weights=found[:, 0]) / np.maximum(np.bincount(side), 1)
+    found[:, 0] -= bright[side]
+    return np.asarray(found)
+
+
+def _correlation(
+    stored: Array, image: Array, cell: NDArray[np.int64], plain: float
+) -> tuple[float, float]:
+    """Of colours (n, 3), and the standard deviation of the stored ones, of 255. They are means over
+    cells (n,) of the surface: letters lie a little elsewhere. 0 where either is `plain`."""
     count = np.bincount(cell)
-    stored = _by_cell(sample.colours[seen], cell, count)
-    image = _by_cell(frame.rgb.reshape(-1, 3)[pixel[near]], cell, count)
-    spread = np.array([np.linalg.norm(stored), np.linalg.norm(image)])
-    deviation = spread / np.sqrt(3 * len(seen))
-    if deviation.min() < config.plain:
+    one, other = (_by_cell(each, cell, count) for each in (stored, image))
+    spread = np.array([np.linalg.norm(one), np.linalg.norm(other)])
+    deviation = spread / np.sqrt(3 * len(cell))
+    if deviation.min() < plain:
         return 0.0, float(deviation[0])
-    return float((stored * image).sum() / spread.prod()), float(deviation[0])
+    return float((one * other).sum() / spread.prod()), float(deviation[0])
 
 
 @dataclass(frozen=True)
@@ -150,7 +191,7 @@ class _Sample:
     """Vertices of a stored mesh, metres, model's axes, whose colours are compared.
 
     points, normals : (n, 3); offsets : (n,) of the planes through them; colours : (n, 3) uint8;
-    cell : (n,) number of the cell of the surface
+    cell : (n,) number of the cell of the surface; side : (n,) of the box, 0 to 5, which they face
     """
 
     points: Array
@@ -158,6 +199,7 @@ class _Sample:
     offsets: Array
     colours: NDArray[np.uint8]
     cell: NDArray[np.int64]
+    side: NDArray[np.int64]
 
 
 @lru_cache(maxsize=64)
@@ -167,12 +209,12 @@ def _sampled(shape: StoredShape, unit: float, vertices: int, cell: float) -> _Sa
     points = shape.vertices[rows].astype(np.float64) * unit
     normals = shape.normals[rows]
     offsets = (points * normals).sum(axis=1)
-    return _Sample(points, normals, offsets, shape.colours[rows], cells_of(points, cell))
+    axis = np.abs(normals).argmax(axis=1)
+    side = 2 * axis + (np.take_along_axis(normals, axis[:, None], axis=1)[:, 0] > 0)
+    return _Sample(points, normals, offsets, shape.colours[rows], cells_of(points, cell), side)
 
 
-def _by_cell(
-    colours: NDArray[np.uint8], cell: NDArray[np.int64], count: NDArray[np.int64]
-) -> Array:
+def _by_cell(colours: Array, cell: NDArray[np.int64], count: NDArray[np.int64]) -> Array:
     """Means (C, 3) of colours (n, 3) over C cells, about that of all, weighted so that the sum of
     squares is one over colours; 0 for a cell without any."""
     sums = np.stack([np.bincount(cell, weights=each) for each in colours.T], axis=-1)

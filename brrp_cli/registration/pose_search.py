@@ -20,7 +20,7 @@ from brrp_cli.registration.begin import best_brought_nearer, best_of, brought_ne
 from brrp_cli.registration.colour_pose import (
     about_main_axes,
     best_and_different,
-    textured_agreement,
+    print_agreement,
     turns_about_itself,
 )
 from brrp_cli.registration.initial_poses import feature_matched_poses
@@ -179,7 +179,7 @@ def by_colour(
     both = [
         each.alignment_score
         + colour.worth
-        * textured_agreement(each.T_cam_model, model, verifier.frame, colour, verifier.lost)
+        * print_agreement(each.T_cam_model, model, verifier.frame, colour, verifier.lost)
         for each in alike
     ]
     chosen = int(np.argmax(both))

@@ -23,7 +23,7 @@ from brrp_cli.prior.shape import StoredShape
 from brrp_cli.registration.colour_pose import (
     about_main_axes,
     best_and_different,
-    textured_agreement,
+    print_agreement,
     turns_about_itself,
 )
 from brrp_cli.registration.pose_search import Hypothesis, different, without_same
@@ -212,9 +212,6 @@ def _as_much_alike(
         return np.ones(len(T), dtype=np.bool_)
     colour = config.colour
     agreement = np.array(
-        [
-            textured_agreement(each, placed.model, verifier.frame, colour, verifier.lost)
-            for each in T
-        ]
+        [print_agreement(each, placed.model, verifier.frame, colour, verifier.lost) for each in T]
     )
     return np.asarray(colour.worth * (agreement - agreement[0]) >= -colour.gain)

@@ -14,7 +14,7 @@ from brrp_cli.registration.colour_pose import (
     about_main_axes,
     best_and_different,
     colour_agreement,
-    textured_agreement,
+    print_agreement,
     turns_about_itself,
 )
 from brrp_cli.registration.model import search_model
@@ -100,14 +100,52 @@ def test_colours_count_too_where_an_object_has_lost_its_depth(scene) -> None:
     assert colour_agreement(back_to_front, model, dark, CONFIG, lost) < -0.8
 
 
-def test_faint_colours_say_little_and_strong_ones_all(scene) -> None:
+def test_faint_print_says_little_and_strong_print_all(scene) -> None:
     model, T, frame = scene
-    assert textured_agreement(T, model, frame, CONFIG) == colour_agreement(T, model, frame, CONFIG)
-    faint = (model.stored.shape.colours * 0.15).astype(np.uint8)
+    assert print_agreement(T, model, frame, CONFIG) > 0.8
+    faint = (model.stored.shape.colours * 0.06).astype(np.uint8)
     shape = replace(model.stored.shape, colours=faint)
     model = replace(model, stored=replace(model.stored, shape=shape))
-    assert colour_agreement(T, model, frame, CONFIG) > 0.8
-    assert 0 < textured_agreement(T, model, frame, CONFIG) < 0.3
+    assert 0 < print_agreement(T, model, frame, CONFIG) < 0.3
+
+
+def seen_sides(model, T, frame):
+    """Which vertices of the box, and which of its pixels (H, W), lie on its upper side."""
+    vertices = model.stored.shape.normals[:, 2] > 0.7
+    points = np.nan_to_num(frame.points.reshape(-1, 3))
+    local = transform_points(np.linalg.inv(T), points)
+    top = local[:, 2] > 0.98 * local[frame.segmap.ravel() == 1, 2].max()
+    return vertices, top.reshape(frame.shape)
+
+
+def test_how_bright_a_side_is_tells_nothing_of_how_a_plain_box_is_turned(scene) -> None:
+    """It was scanned in light from below, and is seen in light from above."""
+    model, T, frame = scene
+    vertices, top = seen_sides(model, T, frame)
+    grey = np.where(vertices[:, None], 90, 150).repeat(3, axis=1).astype(np.uint8)
+    plain = replace(
+        model,
+        stored=replace(model.stored, shape=replace(model.stored.shape, colours=grey)),
+    )
+    lit = np.where(top[..., None], 200, 80).repeat(3, axis=2).astype(np.uint8)
+    frame = replace(frame, rgb=lit)
+    assert colour_agreement(T, plain, frame, CONFIG) < -0.8
+    # Its edges belong to two sides.
+    assert abs(print_agreement(T, plain, frame, CONFIG)) < 0.2
+
+
+def test_print_tells_how_a_box_is_turned_in_whatever_light(scene) -> None:
+    model, T, frame = scene
+    vertices, top = seen_sides(model, T, frame)
+    back_to_front = T @ similarity(rotation=np.diag([-1.0, -1.0, 1.0]))
+    dark_above = model.stored.shape.colours.astype(float) * np.where(vertices[:, None], 0.5, 1.0)
+    shape = replace(model.stored.shape, colours=dark_above.astype(np.uint8))
+    model = replace(model, stored=replace(model.stored, shape=shape))
+    lit = frame.rgb * np.where(top[..., None], 1.4, 0.5)
+    frame = replace(frame, rgb=lit.clip(0, 255).astype(np.uint8))
+    right, wrong = (print_agreement(each, model, frame, CONFIG) for each in (T, back_to_front))
+    assert right > 0.6 and wrong < -0.6
+    assert right > colour_agreement(T, model, frame, CONFIG)
 
 
 def test_an_object_that_was_scanned_askew_turns_about_its_own_axes() -> None:
