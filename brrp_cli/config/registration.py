@@ -72,11 +72,11 @@ class ColourConfig:
     asked: bool = True
     turns: int = 24
     apart: float = 0.5
-    alike: float = 0.2
-    worth: float = 1.0
+    alike: float = 0.07
+    worth: float = 0.8
     gain: float = 0.05
-    printed: float = 12.0
-    unprinted: float = 3.0
+    printed: float = 20.0
+    unprinted: float = 5.0
     cell: float = 0.012
     vertices: int = 4000
     least_seen: int = 40

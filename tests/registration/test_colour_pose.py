@@ -103,10 +103,15 @@ def test_colours_count_too_where_an_object_has_lost_its_depth(scene) -> None:
 def test_faint_print_says_little_and_strong_print_all(scene) -> None:
     model, T, frame = scene
     assert print_agreement(T, model, frame, CONFIG) > 0.8
-    faint = (model.stored.shape.colours * 0.06).astype(np.uint8)
-    shape = replace(model.stored.shape, colours=faint)
-    model = replace(model, stored=replace(model.stored, shape=shape))
-    assert 0 < print_agreement(T, model, frame, CONFIG) < 0.3
+
+    def fainter(share):
+        shape = replace(
+            model.stored.shape, colours=(model.stored.shape.colours * share).astype(np.uint8)
+        )
+        return replace(model, stored=replace(model.stored, shape=shape))
+
+    assert 0 < print_agreement(T, fainter(0.1), frame, CONFIG) < 0.3
+    assert print_agreement(T, fainter(0.05), frame, CONFIG) == 0
 
 
 def seen_sides(model, T, frame):
