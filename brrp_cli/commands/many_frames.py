@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import io
-import logging
 import re
 import time
 from collections.abc import Callable
 from contextlib import ExitStack, redirect_stdout
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -18,12 +18,12 @@ from brrp_cli.commands.frames_summary import (
     SUMMARY,
     earlier_frames,
     join_poses,
-    plain,
     was_tracked,
     write_summary,
 )
+from brrp_cli.commands.frames_there import of_what_is_read, results_with
 from brrp_cli.errors import BrrpError, FrameError, OutputError, ResultError, unexpected
-from brrp_cli.progress import hushed, note, only_bar, progress, say
+from brrp_cli.progress import hushed, note, only_bar, say
 from brrp_cli.spoken import agreed, counted
 
 if TYPE_CHECKING:
@@ -34,7 +34,6 @@ if TYPE_CHECKING:
     from brrp_cli.frames.frame import Frame
     from brrp_cli.results.read import StoredResult
 
-SHOWN = 5  # settings that differ
 DONE, FAILED, SKIPPED = "done", "failed", "was there"
 
 
@@ -123,17 +122,18 @@ def run_many(work: Work, frames: slice, output: Path, report: dict[str, Any]) ->
     there = {
         name: stored
         for name in chosen
-        if not work.overwrite and (stored := _done(folders[name], work.settings)) is not None
+        if not work.overwrite and (stored := results_with(folders[name], work.settings)) is not None
     }
     source = str(work.source.path)
     settings = work.settings | ({"track": True} if work.track else {})
     if there:
         _check_track(output, track=work.track)
-    done = _same(work, there)
-    if changed := len(there) - len(done):
+    done, changed = of_what_is_read(there, partial(_read, work.source))
+    if changed:
+        several = len(changed)
         note(
-            f"{counted(changed, 'frame')} {agreed(changed, 'was', 'were')} reconstructed from other"
-            f" images or masks and {agreed(changed, 'is', 'are')} done again"
+            f"{counted(several, 'frame')} {agreed(several, 'was', 'were')} reconstructed from other"
+            f" images or masks and {agreed(several, 'is', 'are')} done again"
         )
     if done:
         were = f"{len(done)} of {counted(len(chosen), 'frame')} {agreed(len(done), 'was', 'were')}"
@@ -274,89 +274,3 @@ def _folders(names: list[str], output: Path) -> dict[str, Path]:
                 fix="rename one of them, or choose fewer with --frames",
             )
     return folders
-
-
-def _done(folder: Path, settings: dict[str, Any]) -> StoredResult | None:
-    """The results of a frame, where they are there. Errors: OutputError where other settings made
-    them."""
-    if not folder.exists():
-        return None
-    from brrp_cli.api import open_result
-
-    try:
-        stored = open_result(folder)
-    except ResultError:
-        return None
-    record = stored.record
-    prior = record.get("prior")
-    found = {key: record.get(key) for key in settings}
-    found["prior"] = prior.get("digest") if isinstance(prior, dict) else None
-    wanted = plain(settings)
-    if found["segmentation"] is None:  # its masks came with it
-        found["segmentation"] = wanted["segmentation"]
-    one, other = _flat(wanted), _flat(found)
-    different = sorted(key for key in one.keys() | other.keys() if one.get(key) != other.get(key))
-    if different:
-        raise OutputError(
-            "A frame was reconstructed with other settings before",
-            where=folder,
-            expected=_shown(one, different),
-            found=_shown(other, different),
-            fix="choose another folder with -o, or pass --overwrite to do all frames again",
-        )
-    return stored
-
-
-def _same(work: Work, there: dict[str, StoredResult]) -> dict[str, StoredResult]:
-    """Those of the results that are of what the source holds now; all those that do not tell of
-    what they are. Errors: OutputError for results of another source."""
-    from brrp_cli.results.frame_digest import frame_digest
-
-    same = {}
-    # What there is to say of a frame is said where it is done.
-    with hushed(below=logging.ERROR):
-        for name, stored in progress(there.items(), "what is there", len(there)):
-            digest = stored.record.get("source_sha256")
-            if digest is None:
-                same[name] = stored
-                continue
-            try:
-                read = _read(work.source, name)
-            except FrameError:  # told where the frame is done
-                continue
-            if digest == frame_digest(read):
-                same[name] = stored
-            else:
-                _check_source(stored, read)
-    return same
-
-
-def _check_source(stored: StoredResult, read: Frame) -> None:
-    """OutputError for results of a frame of that name of another source: nobody asked for them to
-    be replaced, as those of a frame that was corrected are."""
-    before = stored.record.get("source")
-    if Path(str(before)).resolve() != Path(str(read.source)).resolve():
-        raise OutputError(
-            "A frame of this name was reconstructed from another source before",
-            where=stored.folder,
-            expected=f"results of {read.source}",
-            found=f"results of {before}, which are others",
-            fix="choose another folder with -o, or pass --overwrite to do all frames again",
-        )
-
-
-def _flat(settings: dict[str, Any], above: str = "") -> dict[str, Any]:
-    """Values by dotted names."""
-    flat: dict[str, Any] = {}
-    for key, value in settings.items():
-        if isinstance(value, dict):
-            flat |= _flat(value, f"{above}{key}.")
-        else:
-            flat[f"{above}{key}"] = value
-    return flat
-
-
-def _shown(settings: dict[str, Any], keys: list[str]) -> str:
-    shown = [f"{key} {settings[key]}" if key in settings else f"no {key}" for key in keys[:SHOWN]]
-    more = len(keys) - SHOWN
-    return ", ".join(shown) + (f", and {more} more" if more > 0 else "")

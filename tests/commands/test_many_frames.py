@@ -16,7 +16,7 @@ from table_scene import T_CAM_WORLD, in_camera, photograph
 
 from brrp_cli.cli import main
 from brrp_cli.commands.frames_summary import join_poses
-from brrp_cli.commands.many_frames import _done
+from brrp_cli.commands.frames_there import results_with
 from brrp_cli.config.segmentation import SegmentConfig
 from brrp_cli.errors import OutputError
 from brrp_cli.frames.npz import load_frame, save_frame
@@ -95,7 +95,7 @@ def test_masks_that_were_made_otherwise_are_other_settings(tmp_path):
 
     def with_masks(made):
         (folder / "result.json").write_text(json.dumps(record | {"segmentation": made}))
-        return _done(folder, settings) is not None
+        return results_with(folder, settings) is not None
 
     assert with_masks(None) and with_masks(settings["segmentation"])
     with pytest.raises(OutputError, match="other settings"):
@@ -354,4 +354,5 @@ def test_a_frame_that_can_be_read_no_more_fails_and_its_results_stay(source, tmp
     (source / "f0.npz").write_bytes((source / "f0.npz").read_bytes()[:500])
     again = run(source, "--frames", ":2", "-o", out)
     assert again.exit_code == 3 and again.stderr.count("Error: frame f0.npz: ") == 1
+    assert "other images or masks" not in again.stderr, "nobody knows what it shows now"
     assert (out / "f0.npz" / "object_1.ply").is_file()

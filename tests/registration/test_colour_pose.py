@@ -110,6 +110,7 @@ def test_faint_print_says_little_and_strong_print_all(scene) -> None:
         )
         return replace(model, stored=replace(model.stored, shape=shape))
 
+    assert colour_agreement(T, fainter(0.15), frame, CONFIG) > 0.8
     assert 0 < print_agreement(T, fainter(0.1), frame, CONFIG) < 0.3
     assert print_agreement(T, fainter(0.05), frame, CONFIG) == 0
 
