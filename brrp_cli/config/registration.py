@@ -65,8 +65,7 @@ class ColourConfig:
     gains `gain`: a box that one buys is not quite the one that was scanned. It counts in full from
     a standard deviation of `printed` (of 255) on, and not at all under `unprinted`. Colours are
     means over cells of `cell` metres, of at most `vertices` vertices, of which `least_seen` have to
-    be within `near` metres of the measured depth; as evidence for an object, what differs by less
-    than `plain` (of 255) is of one colour. asked : whether any of this is done
+    be within `near` metres of the measured depth. asked : whether any of this is done
     """
 
     asked: bool = True
@@ -81,7 +80,6 @@ class ColourConfig:
     vertices: int = 4000
     least_seen: int = 40
     near: float = 0.01
-    plain: float = 8.0
 
 
 @dataclass(frozen=True)
@@ -268,8 +266,8 @@ class LikelihoodConfig:
     colour_spread : L*a*b*, by which those of one thing differ
     depth, misfit, missed, covered, free_space, unmasked, below, colour : nats for a nat of depth
     residuals, a standard deviation of misfit, a vote of missed, covered, free or unmasked pixels,
-    all of the surface below the table, full correlation of colours; known_depth : in place of
-    `depth` where P(c|R) follows from how stored objects lie over the measured depth, too
+    all of the surface below the table, full correlation of what is printed; known_depth : in
+    place of `depth` where P(c|R) follows from how stored objects lie over the measured depth, too
     most_votes : that all votes can come to; base : nats of any placement
     other_size : nats against a placement at another size than the stored one
     within : placements whose alignment score is less than the best by more have no weight, nor have
@@ -301,7 +299,7 @@ class LikelihoodConfig:
     free_space: float = 20.7
     unmasked: float = 6.7
     below: float = 49.0
-    colour: float = 5.5
+    colour: float = 6.0
     most_votes: float = 1.03
     base: float = between(1.25, -50.0, 50.0)
     other_size: float = 3.6

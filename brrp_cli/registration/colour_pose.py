@@ -87,25 +87,6 @@ def best_and_different(turns: Array, score: Array, count: int, apart: float) -> 
     return np.array([*different, *rest][:count], dtype=np.int64)
 
 
-def colour_agreement(
-    T_cam_model: Array,
-    model: Model,
-    frame: Frame,
-    config: ColourConfig,
-    lost: NDArray[np.bool_] | None = None,
-) -> float:
-    """Correlation, -1 to 1, of the stored colours of what faces the camera, placed by T_cam_model
-    (4, 4), with the image's at the same pixels; each channel about its own mean, so that the
-    light's brightness and hue do not count. 0 where there is too little to see, or nothing but one
-    colour.
-
-    lost : (H, W) pixels of the object that have no depth, where that alone would be too few"""
-    seen = _seen(T_cam_model, model, frame, config, lost)
-    if seen is None:
-        return 0.0
-    return _correlation(seen.stored, seen.image, seen.cell, config.plain)[0]
-
-
 def print_agreement(
     T_cam_model: Array,
     model: Model,
@@ -113,8 +94,13 @@ def print_agreement(
     config: ColourConfig,
     lost: NDArray[np.bool_] | None = None,
 ) -> float:
-    """The same of what is printed on it: how bright a side of its box is as a whole does not count.
-    Less where there is little to compare: on a plain thing light and shadow decide."""
+    """Correlation, -1 to 1, of the stored colours of what faces the camera, placed by T_cam_model
+    (4, 4), with the image's at the same pixels; each channel about its own mean, and brightness
+    about that of each side of its box, so that how light falls on it does not count. Less where
+    there is little to compare: on a plain thing light and shadow decide. 0 where too little is seen
+    or nothing is printed.
+
+    lost : (H, W) pixels of the object that have no depth, where that alone would be too few"""
     seen = _seen(T_cam_model, model, frame, config, lost)
     if seen is None:
         return 0.0

@@ -15,7 +15,7 @@ was measured:
     unmasked     pixels that the mesh would show, by their depth, and that belong to no object: each
                  as far as its colour is that of the surroundings and not the object's
     below        model surface under the table
-    colour       how well the stored colours agree with the image's
+    colour       how well what is printed on it agrees with the image
 
 Another object that stands in front excuses, and so do pixels without depth and pixels at the mask's
 edge, which sensors blur. What is counted are votes: so many patches as err independently. However
@@ -37,7 +37,7 @@ from brrp_cli.frames.frame import BACKGROUND, Frame
 from brrp_cli.geometry import bounds, grid_nodes, transform_points
 from brrp_cli.observation.pixel_noise import PixelNoise
 from brrp_cli.observation.support_plane import Plane
-from brrp_cli.registration.colour_pose import colour_agreement
+from brrp_cli.registration.colour_pose import print_agreement
 from brrp_cli.registration.model import Model
 from brrp_cli.registration.surroundings import Surroundings, like_surroundings, surroundings
 
@@ -89,7 +89,7 @@ class PlacementEvidence:
     free : votes of pixels that the mesh would hide, and where something behind it was seen
     unmasked : votes of pixels of no object that the mesh would show, in the surroundings' colours
     below : share of the model's surface under the table
-    colour : correlation, -1 to 1
+    colour : correlation, -1 to 1, of what is printed on it with the image
     """
 
     residual: Array
@@ -196,7 +196,7 @@ def evidence(
         free=float(free.sum() / votes),
         unmasked=_surrounding(shown, part, seen, config) / votes,
         below=_below(T_cam_model, model, seen.plane, config),
-        colour=colour_agreement(T_cam_model, model, seen.frame, colour, seen.lost)
+        colour=print_agreement(T_cam_model, model, seen.frame, colour, seen.lost)
         if model.stored.record.get("coloured")
         else 0.0,
     )
