@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-from functools import cache, partial
+from dataclasses import dataclass, replace
+from functools import cached_property, partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,14 +11,23 @@ from numpy.typing import NDArray
 from brrp_cli.completion.seen_surface import SeenSurface, seen_surface
 from brrp_cli.config import FittedMapConfig, HypothesesConfig
 from brrp_cli.config.registration import TrialConfig
+from brrp_cli.inference.hypothesis_posterior import HypothesisPosterior
 from brrp_cli.inference.placed_shape import PlacedShape
 from brrp_cli.methods.each_object import too_few
-from brrp_cli.methods.earlier_views import ALONE, EarlierViews, remember
+from brrp_cli.methods.earlier_views import (
+    ALONE,
+    EarlierViews,
+    Guess,
+    Placed,
+    Remembered,
+    thinned,
+)
 from brrp_cli.methods.infer_object import Shown, infer_object, placed_shape, shown_of
 from brrp_cli.methods.kin_hypotheses import KinHypothesis, beside_round, kin_hypotheses
 from brrp_cli.methods.placements import Placements, Placer
 from brrp_cli.methods.scene import Scene
 from brrp_cli.observation.ray_samples import ObjectObservation
+from brrp_cli.observation.soft_samples import soft_samples
 from brrp_cli.reconstruction import OK, ObjectReconstruction, Similar
 from brrp_cli.registration.pose_search import Hypothesis
 from brrp_cli.registration.seen_mask import SeenMask, seen_mask
@@ -45,26 +54,13 @@ def reconstruct_by_hypotheses(
     probabilities : P(c|R) (n,); earlier : views of the object in the stream's earlier frames; None
     = there is no stream; trial : nothing is inferred, only told which stored objects lie there
     """
-    frame, clear, image, seed = scene.frame, scene.clear, scene.image, scene.seed
-    hypotheses = _hypotheses(scene, trial)
-    object_id = observation.object_id
-    points = _shuffled(observation.points, seed, object_id)
-    mask = seen_mask(frame, object_id, len(points), image.plane, hypotheses.mask)
-    verifier = Verifier(points, frame, image.plane, mask)
-    views = ALONE if earlier is None else earlier
     seconds: dict[str, float] = {}
-    begun: dict[str, list[Hypothesis]] = {}
-    if views:
-        with timed(seconds, "start"):
-            begun = views.begun(scene.prior, verifier, hypotheses)
-            if not views.agree(begun, hypotheses.search.model_points):
-                # It has been moved: what was seen of it elsewhere is forgotten.
-                views, begun = EarlierViews((), views.config), {}
+    thing = _looked_at(scene, observation, earlier, trial, seconds)
+    config, views = thing.config, thing.views
     believed = views.probabilities(probabilities)
-    chosen = _chosen(scene, believed, begun, trial)
     told = partial(
         ObjectReconstruction,
-        object_id=object_id,
+        object_id=observation.object_id,
         status=OK,
         n_points=len(observation.points),
         center=observation.center,
@@ -73,90 +69,164 @@ def reconstruct_by_hypotheses(
         seconds=seconds,
     )
     with timed(seconds, "registration"):
-        placer = Placer(scene, observation, verifier, hypotheses, views)
-        found = placer.placements(chosen, begun)
+        placer = Placer(scene, observation, thing.verifier, config, views)
+        found = placer.placements(_chosen(scene, believed, thing.begun, trial), thing.begun)
         told = partial(told, unknown_weight=found.unknown)
         if trial is not None:
             return told(retrieved=found.retrieved())
-        least = scene.config.observation.min_points
-        few, known = len(points) < least, found.unknown <= 0.5
-        if few and (image.plane is None or not known):
-            return too_few(object_id, len(points), least)
-        like: list[KinHypothesis] = []
-        if not few and found.unknown >= hypotheses.kin.least_unknown:
-            like = kin_hypotheses(
-                clear.object_points(object_id),
-                clear,
-                object_id,
-                image.plane,
-                scene.prior,
-                hypotheses,
-                seed,
-                views.points(),
-                views.depths(),
-                image.mixing,
-            )
-
-    @cache
-    def surface() -> SeenSurface:
-        return seen_surface(clear, object_id, image.plane, image.noise, hypotheses.mean.ramp)
-
-    @cache
-    def shown() -> Shown:
-        cell = scene.config.observation.surface_cell
-        return shown_of(surface(), observation, image.plane, cell, hypotheses)
-
+        if thing.few and (scene.image.plane is None or not _known(found)):
+            least = scene.config.observation.min_points
+            return too_few(observation.object_id, len(observation.points), least)
+        asks_kin = not thing.few and found.unknown >= config.kin.least_unknown
+        like = _kin(thing) if asks_kin else []
     with timed(seconds, "inference"):
-        if like and shown().axis is not None:
-            like = beside_round(like, hypotheses.kin)
-        shared = _shared_with_kin(found.weights, like)
-        if few:
-            # No shape is made of so few points.
-            shared[-1] = 0
-        kept = _kept(shared, hypotheses.map)
-        found, alike = placer.settled(found, kept[kept < len(found.placed)])
-        shared[: len(found.placed)] = found.weights[:-1]
-        posterior, guess = infer_object(
-            observation,
-            frame,
-            image.plane,
-            shown,
-            image.wave,
-            _shapes(kept, found, alike, like, scene, observation, hypotheses, views, mask),
-            shared[kept] / shared[kept].sum(),
-            hypotheses,
-            views,
-            # Strays of what a mask has placed would dent it.
-            trusted=mask is None or mask.trust == 1 or not known,
-            seed=seed,
-            device=scene.device,
-        )
-    memory = None
-    if earlier is not None:
-        memory = remember(
-            frame,
-            image.plane,
-            image.wave,
-            observation,
-            verifier.points,
-            placer.seen,
-            probabilities,
-            [(each, float(w)) for each, w in zip(found.placed, found.weights, strict=False)],
-            found.ratios(),
-            guess,
-            surface(),
-            not views,
-            views.config.samples,
-            child_rng(seed, "remembered", object_id),
-            hypotheses,
-        )
+        if like and thing.shown.axis is not None:
+            like = beside_round(like, config.kin)
+        found, posterior, guess = _inferred(thing, placer, found, like)
     return told(
         retrieved=found.retrieved(),
         similar=[
             Similar(each.shape.name, found.unknown * each.share, each.scales) for each in like
         ],
         posterior=posterior,
-        memory=memory,
+        memory=None if earlier is None else _memory(thing, placer, found, probabilities, guess),
+    )
+
+
+@dataclass(frozen=True)
+class _Thing:
+    """One object that is looked at in its scene, as all steps need it.
+
+    config : as the frame's waves and a trial ask for; mask : where depth shows too little of it;
+    views : earlier ones of it where it is now; begun : its placements in the last, by name
+    """
+
+    scene: Scene
+    observation: ObjectObservation
+    config: HypothesesConfig
+    mask: SeenMask | None
+    verifier: Verifier
+    views: EarlierViews
+    begun: dict[str, list[Hypothesis]]
+
+    @property
+    def few(self) -> bool:
+        """Whether too few points are seen to make a shape of them."""
+        return len(self.observation.points) < self.scene.config.observation.min_points
+
+    @cached_property
+    def surface(self) -> SeenSurface:
+        """What is seen of its surface, smoothed."""
+        image, object_id = self.scene.image, self.observation.object_id
+        ramp = self.config.mean.ramp
+        return seen_surface(self.scene.clear, object_id, image.plane, image.noise, ramp)
+
+    @cached_property
+    def shown(self) -> Shown:
+        """What its completion starts from."""
+        cell, plane = self.scene.config.observation.surface_cell, self.scene.image.plane
+        return shown_of(self.surface, self.observation, plane, cell, self.config)
+
+
+def _looked_at(
+    scene: Scene,
+    observation: ObjectObservation,
+    earlier: EarlierViews | None,
+    trial: TrialConfig | None,
+    seconds: dict[str, float],
+) -> _Thing:
+    """The object with what earlier frames say of it, unless it has been moved since."""
+    config, plane, object_id = _hypotheses(scene, trial), scene.image.plane, observation.object_id
+    points = _shuffled(observation.points, scene.seed, object_id)
+    mask = seen_mask(scene.frame, object_id, len(points), plane, config.mask)
+    verifier = Verifier(points, scene.frame, plane, mask)
+    views = ALONE if earlier is None else earlier
+    begun: dict[str, list[Hypothesis]] = {}
+    if views:
+        with timed(seconds, "start"):
+            begun = views.begun(scene.prior, verifier, config)
+            if not views.agree(begun, config.search.model_points):
+                # It has been moved: what was seen of it elsewhere is forgotten.
+                views, begun = EarlierViews((), views.config), {}
+    return _Thing(scene, observation, config, mask, verifier, views, begun)
+
+
+def _known(found: Placements) -> bool:
+    """Whether it is a stored object rather than none of them."""
+    return found.unknown <= 0.5
+
+
+def _kin(thing: _Thing) -> list[KinHypothesis]:
+    """Hypotheses that it is like a stored object."""
+    scene, views, object_id = thing.scene, thing.views, thing.observation.object_id
+    return kin_hypotheses(
+        scene.clear.object_points(object_id),
+        scene.clear,
+        object_id,
+        scene.image.plane,
+        scene.prior,
+        thing.config,
+        scene.seed,
+        views.points(),
+        views.depths(),
+        scene.image.mixing,
+    )
+
+
+def _inferred(
+    thing: _Thing, placer: Placer, found: Placements, like: list[KinHypothesis]
+) -> tuple[Placements, HypothesisPosterior, Guess | None]:
+    """Placements brought nearer, the posterior of all hypotheses that weigh enough, and what the
+    completion's network thinks, where it is asked."""
+    scene, config = thing.scene, thing.config
+    shared = _shared_with_kin(found.weights, like)
+    if thing.few:
+        # No shape is made of so few points.
+        shared[-1] = 0
+    kept = _kept(shared, config.map)
+    found, alike = placer.settled(found, kept[kept < len(found.placed)])
+    shared[: len(found.placed)] = found.weights[:-1]
+    posterior, guess = infer_object(
+        thing.observation,
+        scene.frame,
+        scene.image.plane,
+        lambda: thing.shown,
+        scene.image.wave,
+        _shapes(thing, kept, found, alike, like),
+        shared[kept] / shared[kept].sum(),
+        config,
+        thing.views,
+        # Strays of what a mask has placed would dent it.
+        trusted=thing.mask is None or thing.mask.trust == 1 or not _known(found),
+        seed=scene.seed,
+        device=scene.device,
+    )
+    return found, posterior, guess
+
+
+def _memory(
+    thing: _Thing, placer: Placer, found: Placements, probabilities: Array, guess: Guess | None
+) -> Remembered:
+    """The object for the frames to come; probabilities : P(c|R) (n,) of this frame alone."""
+    scene, observation, config = thing.scene, thing.observation, thing.config
+    samples = soft_samples(observation, scene.frame, config.map.behind, config.sensor)
+    rng = child_rng(scene.seed, "remembered", observation.object_id)
+    return Remembered(
+        frame=scene.frame,
+        object_id=observation.object_id,
+        plane=scene.image.plane,
+        points=thing.verifier.points,
+        seen=placer.seen,
+        samples=thinned(samples, thing.views.config.samples, rng),
+        wave=scene.image.wave,
+        probabilities=probabilities,
+        placed=tuple(
+            Placed.of(each, float(w)) for each, w in zip(found.placed, found.weights, strict=False)
+        ),
+        ratios=found.ratios(),
+        guess=guess,
+        surface=thing.surface,
+        alone=not thing.views,
     )
 
 
@@ -194,24 +264,28 @@ def _chosen(
 
 
 def _shapes(
+    thing: _Thing,
     kept: NDArray[np.int64],
     found: Placements,
     alike: dict[int, Array],
     like: list[KinHypothesis],
-    scene: Scene,
-    observation: ObjectObservation,
-    config: HypothesesConfig,
-    views: EarlierViews,
-    mask: SeenMask | None,
 ) -> list[PlacedShape]:
     """Of the hypotheses `kept`: placements first, then kin; the completion has none."""
     count = len(found.placed)
-    return [
-        placed_shape(
-            found.placed[i], observation.points, scene.image.wave, config, views, alike.get(i), mask
+
+    def placed(i: int) -> PlacedShape:
+        return placed_shape(
+            found.placed[i],
+            thing.observation.points,
+            thing.scene.image.wave,
+            thing.config,
+            thing.views,
+            alike.get(i),
+            thing.mask,
         )
-        if i < count
-        else like[i - count].shape
+
+    return [
+        placed(i) if i < count else like[i - count].shape
         for i in kept.tolist()
         if i < count + len(like)
     ]

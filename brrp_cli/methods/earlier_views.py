@@ -23,8 +23,7 @@ from brrp_cli.frames.frame import Frame
 from brrp_cli.geometry import inverse, normalise, transform_points
 from brrp_cli.kin.evidence import OtherDepth
 from brrp_cli.methods.base import EarlierView
-from brrp_cli.observation.ray_samples import ObjectObservation
-from brrp_cli.observation.soft_samples import SoftSamples, soft_samples
+from brrp_cli.observation.soft_samples import SoftSamples
 from brrp_cli.observation.support_plane import Plane
 from brrp_cli.prior.store import Prior
 from brrp_cli.registration.likelihood import SeenPixels
@@ -47,6 +46,17 @@ class Placed:
     scale: float
     alignment_score: float
     weight: float
+
+    @classmethod
+    def of(cls, hypothesis: Hypothesis, weight: float) -> Placed:
+        """What a later frame needs of a placement."""
+        return cls(
+            hypothesis.model.stored.name,
+            hypothesis.T_cam_model,
+            hypothesis.scale,
+            hypothesis.alignment_score,
+            weight,
+        )
 
 
 @dataclass(frozen=True)
@@ -94,46 +104,10 @@ class Remembered:
     alone: bool
 
 
-def remember(
-    frame: Frame,
-    plane: Plane | None,
-    wave: float,
-    observation: ObjectObservation,
-    points: Array,
-    seen: SeenPixels,
-    probabilities: Array,
-    placed: Sequence[tuple[Hypothesis, float]],
-    ratios: dict[str, float],
-    guess: Guess | None,
-    surface: SeenSurface,
-    alone: bool,
-    most_samples: int,
-    rng: np.random.Generator,
-    config: HypothesesConfig,
-) -> Remembered:
-    """An object after inference, for the frames to come; placed : hypotheses and weights; the rest
-    as of `Remembered`."""
-    samples = soft_samples(observation, frame, config.map.behind, config.sensor)
-    rows = rng.permutation(len(samples.points))[:most_samples]
-    thinned = SoftSamples(samples.points[rows], samples.targets[rows], samples.measured[rows])
-    return Remembered(
-        frame,
-        observation.object_id,
-        plane,
-        points,
-        seen,
-        thinned,
-        wave,
-        probabilities,
-        tuple(
-            Placed(h.model.stored.name, h.T_cam_model, h.scale, h.alignment_score, weight)
-            for h, weight in placed
-        ),
-        ratios,
-        guess,
-        surface,
-        alone,
-    )
+def thinned(samples: SoftSamples, most: int, rng: np.random.Generator) -> SoftSamples:
+    """At most so many of the samples, drawn at random."""
+    rows = rng.permutation(len(samples.points))[:most]
+    return SoftSamples(samples.points[rows], samples.targets[rows], samples.measured[rows])
 
 
 @dataclass(frozen=True)
