@@ -12,7 +12,6 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from brrp_cli.errors import WeightsError
 from brrp_cli.evaluation.bootstrap import ROUNDS
 from brrp_cli.evaluation.folder import PARAMETERS, ROWS, claimed
 from brrp_cli.evaluation.match_names import match_names
@@ -27,8 +26,9 @@ from brrp_cli.evaluation.summary import (
     summarise,
 )
 from brrp_cli.evaluation.variants import Variant, expand, same_results, short_labels
+from brrp_cli.evaluation.weights import described_weights, named_weights, weights_digests
 from brrp_cli.evaluation.work import Plan
-from brrp_cli.executors.executor import open_executor
+from brrp_cli.executors.executor import Executor, open_executor
 from brrp_cli.files import sha256_file, write_bytes
 from brrp_cli.ground_truth.scenes import Scene, find_scenes
 from brrp_cli.ground_truth.true_meshes import truth_cache
@@ -89,17 +89,9 @@ def evaluate(request: Request, say: Callable[[str], None] = lambda text: None) -
     scenes = find_scenes(request.scenes, request.selection)
     opened = _prior(request)
     prior = None if opened is None else {"path": str(opened.path), "digest": opened.digest}
-    weights = named_weights(request)
+    weights = named_weights(request.methods, request.weights)
     training = described_weights(request.methods, weights)
-    variants = expand(
-        request.methods,
-        request.presets,
-        request.ks,
-        [resolve_name(name, request.clip_dir) for name in request.retrievers],
-        request.shifts,
-        list(weights),
-        [read_config(path) for path in request.configs],
-    )
+    variants = _variants(request, list(weights))
     _check_prior(opened, variants)
     if any(variant.retriever in USE_CLIP for variant in variants):
         _prepare_clip(opened, need_clip_folder(request.clip_dir))
@@ -107,15 +99,7 @@ def evaluate(request: Request, say: Callable[[str], None] = lambda text: None) -
     data_root = request.data_root or find_data_root(scenes, request.scenes)
     if opened is not None:
         scenes, matched = match_names(scenes, data_root, opened.manifest.objects)
-        if not matched:
-            say(
-                f"None of the true objects is in the prior {opened.path}, by content or by name:"
-                " what the tables say of retrieval and recognition is of strangers alone"
-            )
-    for variant in variants:
-        if opened is not None and variant.k is not None and variant.k > len(opened.names):
-            held = counted(len(opened.names), "object")
-            say(f"--k {variant.k}: the prior holds {held}, all are taken")
+        _say_what_is_odd(opened, matched > 0, variants, say)
     labels = short_labels(variants)
     plan = Plan(
         scenes=scenes,
@@ -136,24 +120,7 @@ def evaluate(request: Request, say: Callable[[str], None] = lambda text: None) -
     ):
         say(f"{counted(len(scenes), 'scene')}, {executor.title}: {', '.join(labels.values())}")
         log = RowLog(path)
-        lost: dict[str, str] = {}
-        todo = remaining(plan, log)
-        work = run_remaining(plan, log, todo, executor)
-        try:
-            for ended, error in progress(work, "true meshes, then scenes", len(todo)):
-                if error is not None and isinstance(ended, Scene):
-                    lost[ended.name] = str(error)
-                if error is not None:
-                    say(f"{ended.name}: {error}")
-        except KeyboardInterrupt as stop:
-            raise stopped(
-                stop,
-                where=request.output,
-                found="scenes and variants that were finished are kept",
-                fix="give the same command again to go on",
-            ) from None
-        finally:
-            work.close()
+        lost = _run(plan, log, executor, request.output, say)
         rows = collect(plan, log, lost)
         about = {
             **parameters,
@@ -173,37 +140,57 @@ def evaluate(request: Request, say: Callable[[str], None] = lambda text: None) -
     return Result(summaries, labels, lost, files)
 
 
-def described_weights(
-    methods: Sequence[str], weights: Mapping[str, Path]
-) -> dict[str, dict[str, Any]]:
-    """What each file says of its training. Errors: WeightsError for one that cannot be used."""
-    describers = (METHODS[name].describe_weights for name in methods if name in METHODS)
-    return {
-        name: describe(path)
-        for describe in describers
-        if describe is not None
-        for name, path in weights.items()
-    }
+def _variants(request: Request, weights: Sequence[str]) -> list[Variant]:
+    """What is compared, as the options ask for it; weights : names."""
+    return expand(
+        request.methods,
+        request.presets,
+        request.ks,
+        [resolve_name(name, request.clip_dir) for name in request.retrievers],
+        request.shifts,
+        weights,
+        [read_config(path) for path in request.configs],
+    )
 
 
-def named_weights(request: Request) -> dict[str, Path]:
-    """Weights by the names of their files, which stand for them in tables: those that are given,
-    else those that the methods bring.
+def _say_what_is_odd(
+    prior: Prior, matched: bool, variants: Sequence[Variant], say: Callable[[str], None]
+) -> None:
+    """matched : whether any true object is in the prior"""
+    if not matched:
+        say(
+            f"None of the true objects is in the prior {prior.path}, by content or by name:"
+            " what the tables say of retrieval and recognition is of strangers alone"
+        )
+    for variant in variants:
+        if variant.k is not None and variant.k > len(prior.names):
+            held = counted(len(prior.names), "object")
+            say(f"--k {variant.k}: the prior holds {held}, all are taken")
 
-    Errors: WeightsError for two of one name.
-    """
-    own = (METHODS[name].own_weights for name in request.methods if name in METHODS)
-    found: dict[str, Path] = {}
-    for path in request.weights or [path for path in own if path is not None]:
-        if path.stem in found:
-            raise WeightsError(
-                "Two files of weights have one name",
-                where=path,
-                found=found[path.stem],
-                fix="rename one: the name tells them apart in the tables",
-            )
-        found[path.stem] = path
-    return found
+
+def _run(
+    plan: Plan, log: RowLog, executor: Executor, output: Path, say: Callable[[str], None]
+) -> dict[str, str]:
+    """What is not in the log yet; scene -> why it has no rows. Errors: StoppedError."""
+    lost: dict[str, str] = {}
+    todo = remaining(plan, log)
+    work = run_remaining(plan, log, todo, executor)
+    try:
+        for ended, error in progress(work, "true meshes, then scenes", len(todo)):
+            if error is not None and isinstance(ended, Scene):
+                lost[ended.name] = str(error)
+            if error is not None:
+                say(f"{ended.name}: {error}")
+    except KeyboardInterrupt as stop:
+        raise stopped(
+            stop,
+            where=output,
+            found="scenes and variants that were finished are kept",
+            fix="give the same command again to go on",
+        ) from None
+    finally:
+        work.close()
+    return lost
 
 
 def find_data_root(scenes: Sequence[Scene], folder: Path) -> Path:
@@ -285,17 +272,11 @@ def _parameters(
         "prior_digest": None if prior is None else prior["digest"],
         "clip": str(clip) if uses_clip else None,
         "tables": {file: sha256_file(Path(file)) for file in sorted(files)},
-        **_weights_digests(weights),
+        **weights_digests(weights),
         "noise": request.noise,
         "seed": request.seed,
         "variants": {variant.label: variant.configuration for variant in variants},
     }
-
-
-def _weights_digests(weights: Mapping[str, Path]) -> dict[str, Any]:
-    """Nothing where there are none, so that runs without weights stay what they were."""
-    digests = {name: sha256_file(path) for name, path in weights.items()}
-    return {"weights": digests} if digests else {}
 
 
 def _write(

@@ -13,7 +13,7 @@ from tabletop.held_out import held_out_names
 from brrp_cli import reconstruct
 from brrp_cli.cli import main
 from brrp_cli.config import PointSDFConfig
-from brrp_cli.evaluation.request import Request, named_weights
+from brrp_cli.evaluation.weights import named_weights
 from brrp_cli.frames.npz import save_frame
 from brrp_cli.ground_truth.metrics import f_score, sample_surface
 from brrp_cli.methods.pointsdf.weights import OWN_WEIGHTS, describe_weights
@@ -82,10 +82,7 @@ def test_the_record_names_them(out):
 
 
 def test_evaluations_take_them_where_no_others_are_given(tmp_path):
-    def asked(methods, weights):
-        return named_weights(Request(tmp_path, tmp_path, methods, [], [], [], [], weights=weights))
-
     other = tmp_path / "other.safetensors"
-    assert asked(["vprism", "pointsdf"], []) == {"tabletop": OWN_WEIGHTS}
-    assert asked(["pointsdf"], [other]) == {"other": other}
-    assert asked(["vprism"], []) == {}
+    assert named_weights(["vprism", "pointsdf"], []) == {"tabletop": OWN_WEIGHTS}
+    assert named_weights(["pointsdf"], [other]) == {"other": other}
+    assert named_weights(["vprism"], []) == {}
