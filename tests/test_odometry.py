@@ -115,12 +115,12 @@ def test_edges_lie_where_they_did_or_do_not():
     rng = np.random.default_rng(0)
     frame = scene(PLACES)
     noisy = np.clip(frame.rgb + rng.normal(0, 4, frame.rgb.shape), 0, 255).astype(np.uint8)
-    assert edge_motion(frame, replace(frame, rgb=noisy)) < 0.15
+    assert edge_motion(frame, replace(frame, rgb=noisy), TRACK) < 0.15
     for way, axis in ((1, 1), (-1, 1), (1, 0)):
         moved = replace(frame, rgb=np.roll(frame.rgb, way, axis))
-        assert edge_motion(frame, moved) > 0.4
+        assert edge_motion(frame, moved, TRACK) > 0.4
     plain = replace(frame, rgb=np.full_like(frame.rgb, 90))
-    assert edge_motion(plain, frame) == 0
+    assert edge_motion(plain, frame, TRACK) == 0
     grey = [scene(PLACES), scene(PLACES, yaw=YAW + STEP)]
     assert not background_stands(*grey, TRACK), "a table looks the same from all sides"
 

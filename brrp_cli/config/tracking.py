@@ -90,12 +90,16 @@ class OdometryConfig:
     wrong : part of what an earlier frame saw at objects that may look otherwise by then, at most
     turn, shift : radians and metres from which on another frame takes the place of the one that
     later ones are held to
+    begun, steps : as many images, each of half the size, from the smallest on, with so many steps:
+    small images lead far, and astray where there is little to see, so `begun` goes without them
     """
 
     reach: float = 3.0
     wrong: float = share(0.12)
     turn: float = 0.1
     shift: float = 0.1
+    begun: tuple[int, ...] = (8, 6)
+    steps: tuple[int, ...] = (20, 10, 5)
 
 
 @dataclass(frozen=True)
@@ -106,15 +110,18 @@ class TrackConfig:
         for the two to be one object
     reach : that an object's middle may have moved between two frames to be still looked for;
         colour : mean difference of its colours, of 255, at most; growth : factor by which its
-        number of pixels may differ
+        number of pixels may differ; shown : part of where it was that must be seen for it to have
+        moved: from what is hidden nobody can tell
     still : median of what depth has changed by, at most, on an object that has not moved; of the
         background the median of its size; noise : median of its size on such an object, at most;
         beyond 1 m both sizes may grow with the square of depth, as noise does
     still_mask : IoU of its two masks, at least
     still_camera : metres and radians by which poses of one camera that stands may differ. Where no
     pose is given, a camera stands if both images share a share `ground` of background with depth,
-    which has changed by `still` at most in the middle and `still_tail` times that in nine tenths of
-    it, its colours by `still_colour`, of 255, and edges lie within `still_edges` pixels
+    which has changed by `still` at most in the middle and `still_tail` times that in the share
+    `still_most` of it, its colours by `still_colour`, of 255, and edges lie within `still_edges`
+    pixels: where brightness changes by `edge`, of 255, from pixel to pixel; fewer than
+    `least_edges` such pixels tell nothing
     lost : tracks that are remembered while their object is out of sight
     carry : when masks that were mended hold in the next frame
     glide : when masks and results hold before a camera that moves a little; None = never
@@ -126,14 +133,18 @@ class TrackConfig:
     reach: float = 0.3
     colour: float = 40.0
     growth: float = 2.0
+    shown: float = share(0.5)
     still: float = 0.002
     noise: float = 0.005
     still_mask: float = share(0.9)
     still_camera: float = 0.0005
     ground: float = share(0.2)
     still_tail: float = 5.0
+    still_most: float = share(0.9)
     still_colour: float = 10.0
     still_edges: float = 0.3
+    edge: float = 12.0
+    least_edges: int = 200
     lost: int = between(16, 0, 1000)
     carry: CarryConfig = field(default_factory=CarryConfig)
     glide: GlideConfig | None = field(default_factory=GlideConfig)

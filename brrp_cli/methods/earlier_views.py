@@ -75,6 +75,7 @@ class Guess:
         share = map_coordinates(told.astype(np.float32), at, order=1, mode="constant")
         values = np.where(told, self.values, 0).astype(np.float32)
         total = map_coordinates(values, at, order=1, mode="constant")
+        # Most of what it would be interpolated from.
         known = share > 0.5
         return np.where(known, total / np.where(known, share, 1), 0), known
 
@@ -277,6 +278,7 @@ class EarlierViews:
             return True
         view = self.views[-1]
         was = max(view.memory.placed, key=lambda p: p.weight, default=None)
+        # More likely than not is what takes a half of the weight.
         if was is None or was.weight <= 0.5 or was.name not in begun:
             return True
         now = begun[was.name][0]

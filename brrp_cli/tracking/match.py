@@ -37,10 +37,9 @@ def match(
 def _shows_its_place(
     last: Frame, frame: Frame, T: NDArray[np.float64], old: int, config: TrackConfig
 ) -> bool:
-    """Whether the frame shows at least half of where the object was: from what is hidden nobody
-    can tell that it has moved."""
+    """Whether the frame shows enough of where the object was to tell that it has moved."""
     gap = depth_behind(transform_points(T, last.object_points(old)), frame)
-    return bool(len(gap)) and float((gap >= -config.carry.gap).mean()) >= 0.5
+    return bool(len(gap)) and float((gap >= -config.carry.gap).mean()) >= config.shown
 
 
 def _assign(

@@ -14,9 +14,6 @@ from brrp_cli.frames.frame import BACKGROUND, Frame
 from brrp_cli.frames.projection import at_pixels, depth_behind
 from brrp_cli.geometry import inverse, normalise, transform_points
 
-# Of 255 in a pixel, from which on a slope of brightness is an edge; pixels of them that tell.
-EDGE, LEAST_EDGES = 12.0, 200
-
 
 def unmoved(before: Frame, frame: Frame, config: TrackConfig) -> frozenset[int]:
     """The ids of two frames of one stream whose object has not moved between them; none where the
@@ -95,13 +92,13 @@ def background_stands(last: Frame, frame: Frame, config: TrackConfig) -> bool:
     colour = np.abs(last.rgb[ground].astype(np.int16) - frame.rgb[ground]).mean()
     return bool(
         np.median(apart) <= config.still
-        and np.quantile(apart, 0.9) <= config.still_tail * config.still
+        and np.quantile(apart, config.still_most) <= config.still_tail * config.still
         and colour <= config.still_colour
-        and edge_motion(last, frame) <= config.still_edges
+        and edge_motion(last, frame, config) <= config.still_edges
     )
 
 
-def edge_motion(last: Frame, frame: Frame) -> float:
+def edge_motion(last: Frame, frame: Frame, config: TrackConfig) -> float:
     """Pixels by which the edges of two images lie apart, the median of what each of the stronger
     ones tells across itself (normal flow); 0 where there are too few."""
     # Blurred, or a sharp edge would be seen on one side alone; channel by channel, since things of
@@ -116,8 +113,8 @@ def edge_motion(last: Frame, frame: Frame) -> float:
     )
     slope /= 2
     changed = np.abs(now - before)[:, 1:-1, 1:-1]
-    strong = slope >= EDGE
-    if strong.sum() < LEAST_EDGES:
+    strong = slope >= config.edge
+    if strong.sum() < config.least_edges:
         return 0.0
     return float(np.median(changed[strong] / slope[strong]))
 

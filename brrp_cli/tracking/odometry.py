@@ -19,8 +19,6 @@ from brrp_cli.geometry import inverse, rotation_angle, transform_points
 from brrp_cli.tracking.motion import background_stands, noisier
 
 Array = NDArray[np.float64]
-# Small images lead far, and astray where there is little to see: at first without them.
-STEPS = ((8, 6), (20, 10, 5))
 
 
 class Odometry:
@@ -55,7 +53,7 @@ class Odometry:
         if self._key is None or self._key.stream_pose is None or _far(self._key, last, own):
             self._key = last
         held_to = ((self._key, self._step @ _between(self._key, last)), (last, np.eye(4)))
-        for steps, (key, guess) in product(STEPS, held_to):
+        for steps, (key, guess) in product((own.begun, own.steps), held_to):
             T_now_key = motion(key, frame, guess, steps, own)
             if T_now_key is None or _wrong(key, frame, T_now_key, self._config) > own.wrong:
                 continue
@@ -89,7 +87,7 @@ def motion(
     """T_now_then (4, 4) of two images of one camera of things at rest, by Open3D (colour and depth
     together, Park et al., ICCV 2017); None where it finds none.
 
-    steps : as many images, each of half the size, from the smallest on, with so many steps
+    steps : as of `OdometryConfig`
     """
     o3d = import_open3d()
     odometry = o3d.pipelines.odometry
