@@ -1,8 +1,32 @@
-"""How exported scenes are put to rest. Lengths are metres, angles degrees, times seconds."""
+"""How scenes are exported and put to rest. Lengths are metres, angles degrees, times seconds."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class PartsConfig:
+    """Convex parts of an object (brrp_cli/planning/parts.py).
+
+    concavity : hollows shallower than this are filled, which is what CoACD calls concavity
+    iterations : of CoACD's Monte Carlo tree search; its own 150 take twice as long for the same
+    number of parts
+    """
+
+    concavity: float = 0.01
+    iterations: int = 60
+
+
+@dataclass(frozen=True)
+class TableBoxConfig:
+    """The box that is made of the support plane.
+
+    margin : by which it goes beyond all that stands on it; thickness : of it
+    """
+
+    margin: float = 0.25
+    thickness: float = 0.02
 
 
 @dataclass(frozen=True)
@@ -13,6 +37,7 @@ class RestConfig:
     friction : Coulomb's coefficient between two surfaces, a guess
     torsion, rolling : metres, friction against turning on the spot and against rolling; without
     it a can on its side rolls on the faces of its mesh for ever
+    clearance : between the table and what is put on it where nothing is put to rest
     contact_time : seconds in which MuJoCo's contacts push out what is inside; with its own 0.02 a
     plate sinks by 5 mm
 
@@ -34,6 +59,7 @@ class RestConfig:
     friction: float = 1.0
     torsion: float = 0.005
     rolling: float = 0.001
+    clearance: float = 0.0005
     contact_time: float = 0.005
     apart: float = 0.6
     apart_time: float = 0.02

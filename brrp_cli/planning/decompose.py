@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from brrp_cli.config.planning import PartsConfig
 from brrp_cli.errors import BrrpError, ResultError
 from brrp_cli.planning.parts import COACD, HULL, convex_parts
 from brrp_cli.threads import cores
@@ -40,17 +41,19 @@ class Solid:
     faces: NDArray[np.int64]
 
 
-def parts_of(solids: Sequence[Solid], how: str, seed: int) -> Iterator[list[Array]]:
+def parts_of(
+    solids: Sequence[Solid], how: str, seed: int, config: PartsConfig
+) -> Iterator[list[Array]]:
     """The convex parts of each solid, in their order, as `convex_parts` makes them.
 
     Errors: those of `convex_parts`; ResultError where a process died over it.
     """
     if how != COACD:
-        yield from (convex_parts(each.vertices, each.faces, how, seed) for each in solids)
+        yield from (convex_parts(each.vertices, each.faces, how, seed, config) for each in solids)
         return
     running = _Running()
     with ThreadPoolExecutor(max(min(len(solids), cores()), 1)) as pool:
-        futures = [pool.submit(running.decompose, each, seed) for each in solids]
+        futures = [pool.submit(running.decompose, each, seed, config) for each in solids]
         try:
             for future in futures:
                 yield future.result()
@@ -79,8 +82,8 @@ class _Running:
     killed: bool = False
     lock: Lock = field(default_factory=Lock)
 
-    def decompose(self, solid: Solid, seed: int) -> list[Array]:
-        task = pickle.dumps((solid.vertices, solid.faces, COACD, seed))
+    def decompose(self, solid: Solid, seed: int, config: PartsConfig) -> list[Array]:
+        task = pickle.dumps((solid.vertices, solid.faces, COACD, seed, config))
         with self.lock:
             if self.killed:
                 return []

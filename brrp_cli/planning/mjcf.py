@@ -18,7 +18,6 @@ from brrp_cli.planning.numbers import quaternion_wxyz, spell
 VISUAL, COLLISION = "2", "3"
 FURNITURE_COLOUR = (0.6, 0.6, 0.65)  # RGB, 0 to 1
 TABLE_COLOUR = (0.7, 0.66, 0.6, 1.0)  # RGBA
-CLEARANCE = 0.0005  # metres between the table and what is put on it
 
 
 @dataclass(frozen=True)
@@ -92,7 +91,7 @@ def scene_mjcf(
         T = body.T_frame_body.copy() if poses is None else poses[name]
         if table is not None and poses is None:
             lift = lift_onto(body, table.up, table.offset)
-            T[:3, 3] += (lift + CLEARANCE if lift > 0 else 0.0) * table.up
+            T[:3, 3] += (lift + config.clearance if lift > 0 else 0.0) * table.up
         _add_body(assets, world, body, files[name], T)
     return _text(model)
 

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from brrp_cli.config.planning import PartsConfig
 from brrp_cli.dependencies import import_library
 from brrp_cli.errors import DependencyError
 
@@ -14,10 +15,6 @@ Array = NDArray[np.float64]
 
 COACD, HULL = "coacd", "hull"
 HOW = (COACD, HULL)
-# Hollows shallower than this are filled, metres: what CoACD calls concavity.
-CONCAVITY = 0.01
-# Of CoACD's Monte Carlo tree search; its own 150 take twice as long for the same number of parts.
-ITERATIONS = 60
 
 
 def convex_parts(
@@ -25,17 +22,17 @@ def convex_parts(
     faces: NDArray[np.int64],
     how: str,
     seed: int,
-    concavity: float = CONCAVITY,
+    config: PartsConfig,
 ) -> list[Array]:
     """Corners (k, 3) of convex parts that together hold every vertex (n, 3) of a closed mesh.
 
-    how : "hull", one part, or "coacd", as many as it takes to keep hollows deeper than `concavity`,
-    metres (Wei et al., SIGGRAPH 2022). The same seed gives the same parts. Errors: DependencyError
-    without the library `coacd`.
+    how : "hull", one part, or "coacd", as many as it takes to keep hollows deeper than
+    `config.concavity` (Wei et al., SIGGRAPH 2022). The same seed gives the same parts. Errors:
+    DependencyError without the library `coacd`.
     """
     if how == HULL:
         return [hull_corners(vertices)]
-    parts = _decomposed(vertices, faces, seed, concavity)
+    parts = _decomposed(vertices, faces, seed, config)
     return cover([hull_corners(part) for part in parts], vertices)
 
 
@@ -78,7 +75,7 @@ def outside_hull(part: Array, points: Array) -> Array:
 
 
 def _decomposed(
-    vertices: Array, faces: NDArray[np.int64], seed: int, concavity: float
+    vertices: Array, faces: NDArray[np.int64], seed: int, config: PartsConfig
 ) -> list[Array]:
     coacd: Any = import_library("coacd")
     coacd.set_log_level("error")
@@ -86,10 +83,10 @@ def _decomposed(
     half_width = float(np.ptp(vertices, axis=0).max()) / 2
     parts = coacd.run_coacd(
         coacd.Mesh(vertices, faces),
-        threshold=float(np.clip(concavity / half_width, 0.01, 1.0)),
+        threshold=float(np.clip(config.concavity / half_width, 0.01, 1.0)),
         # Marching cubes leave a closed 2-manifold; remeshing it would move its surface.
         preprocess_mode="off",
-        mcts_iterations=ITERATIONS,
+        mcts_iterations=config.iterations,
         seed=seed,
     )
     found = [np.asarray(corners, dtype=np.float64) for corners, _ in parts]

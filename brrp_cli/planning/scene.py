@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from brrp_cli.completion.completed_mean import empty_space
 from brrp_cli.config import MeanConfig, StrayConfig
+from brrp_cli.config.planning import PartsConfig, TableBoxConfig
 from brrp_cli.errors import ResultError
 from brrp_cli.geometry import IMAGE_UP, similarity, transform_points
 from brrp_cli.observation.strays import without_strays
@@ -27,9 +28,6 @@ from brrp_cli.surface.free_space import free_balls
 
 if TYPE_CHECKING:
     import trimesh
-
-# Of the table: metres beyond the objects' corners, and from its top to its lower side.
-TABLE_MARGIN, TABLE_THICKNESS = 0.25, 0.02
 
 
 @dataclass(frozen=True)
@@ -55,7 +53,7 @@ def planned_objects(stored: StoredResult, options: PlanOptions) -> Iterator[Plan
         )
         for shape in shapes
     ]
-    found = parts_of(solids, options.collision, options.seed)
+    found = parts_of(solids, options.collision, options.seed, PartsConfig())
     for shape, parts in zip(shapes, found, strict=True):
         mass, inertia = mass_and_inertia(shape.local, options.density)
         body = Body(
@@ -108,7 +106,10 @@ def upwards(stored: StoredResult) -> NDArray[np.float64]:
 
 
 def table_under(
-    bodies: list[Body], plane: Plane | None, around: Furniture | None = None
+    bodies: list[Body],
+    plane: Plane | None,
+    config: TableBoxConfig,
+    around: Furniture | None = None,
 ) -> Table | None:
     """A table whose top is the plane, or lies below it where that is a platform's, under all
     bodies, bins and platforms; None without a plane.
@@ -127,10 +128,10 @@ def table_under(
         ]
     )
     local = corners @ axes
-    low, high = local.min(axis=0) - TABLE_MARGIN, local.max(axis=0) + TABLE_MARGIN
+    low, high = local.min(axis=0) - config.margin, local.max(axis=0) + config.margin
     middle = (low + high) / 2
-    middle[2] = -around.table(plane).offset - TABLE_THICKNESS / 2
-    size = np.array([*(high - low)[:2], TABLE_THICKNESS])
+    middle[2] = -around.table(plane).offset - config.thickness / 2
+    size = np.array([*(high - low)[:2], config.thickness])
     bins = {f"bin_{number}": walls for number, walls in enumerate(around.bins, start=1)}
     walls = {f"wall_{number}": [wall] for number, wall in enumerate(around.walls, start=1)}
     platforms = {

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from brrp_cli.config.planning import RestConfig
+from brrp_cli.config.planning import RestConfig, TableBoxConfig
 from brrp_cli.errors import ResultError
 from brrp_cli.files import atomic_folder
 from brrp_cli.planning.body import Body
@@ -74,7 +74,9 @@ def write_plan(
     with atomic_folder(folder, overwrite=overwrite, mark=RECORD) as partial:
         objects = list(planned_objects(stored, options) if planned is None else planned)
         bodies = {each.body.name: each.body for each in objects}
-        table = table_under(list(bodies.values()), stored.plane, furniture_around(stored))
+        table = table_under(
+            list(bodies.values()), stored.plane, TableBoxConfig(), furniture_around(stored)
+        )
         config, resting = RestConfig(), {}
         if options.rests and table is not None:
             resting = put_to_rest(bodies, table, config)

@@ -6,6 +6,7 @@ import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from brrp_cli.config.planning import PartsConfig
 from brrp_cli.planning.parts import COACD, HULL, convex_parts, cover, hull_corners, outside_hull
 from brrp_cli.planning.union import union_of_hulls
 from brrp_cli.shapes import solids
@@ -19,7 +20,7 @@ def channel() -> trimesh.Trimesh:
 
 
 def of(mesh, how, seed=0):
-    return convex_parts(np.asarray(mesh.vertices), np.asarray(mesh.faces), how, seed)
+    return convex_parts(np.asarray(mesh.vertices), np.asarray(mesh.faces), how, seed, PartsConfig())
 
 
 def test_a_hull_is_one_part_with_the_corners_alone():

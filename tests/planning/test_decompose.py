@@ -7,11 +7,14 @@ import time
 import numpy as np
 import pytest
 
+from brrp_cli.config.planning import PartsConfig
 from brrp_cli.errors import ResultError
 from brrp_cli.planning import decompose
 from brrp_cli.planning.decompose import Solid, parts_of
 from brrp_cli.planning.parts import COACD, HULL, convex_parts
 from brrp_cli.shapes import solids
+
+CONFIG = PartsConfig()
 
 
 def solid(mesh, name="one") -> Solid:
@@ -29,8 +32,8 @@ def two():
 @pytest.mark.parametrize("how", [COACD, HULL])
 def test_parts_are_those_of_one_process(how, two):
     pytest.importorskip("coacd")
-    for found, each in zip(parts_of(two, how, 0), two, strict=True):
-        expected = convex_parts(each.vertices, each.faces, how, 0)
+    for found, each in zip(parts_of(two, how, 0, CONFIG), two, strict=True):
+        expected = convex_parts(each.vertices, each.faces, how, 0, CONFIG)
         assert len(found) == len(expected)
         assert all(np.array_equal(a, b) for a, b in zip(found, expected, strict=True))
 
@@ -38,7 +41,7 @@ def test_parts_are_those_of_one_process(how, two):
 def test_a_process_that_dies_takes_nothing_along(two, monkeypatch):
     monkeypatch.setattr(decompose, "_BEGIN", "raise SystemExit('too much memory')")
     with pytest.raises(ResultError, match=r"(?s)died over a mesh.*channel.*too much.*hull"):
-        list(parts_of(two, COACD, 0))
+        list(parts_of(two, COACD, 0, CONFIG))
 
 
 def test_who_stops_waits_for_none(two, monkeypatch):
@@ -52,7 +55,7 @@ def test_who_stops_waits_for_none(two, monkeypatch):
 
     monkeypatch.setattr(decompose.subprocess.Popen, "communicate", stop)
     with pytest.raises(KeyboardInterrupt):
-        next(parts_of(two[:1], COACD, 0))
+        next(parts_of(two[:1], COACD, 0, CONFIG))
     (process,) = running.processes
     start = time.perf_counter()
     assert process.wait(timeout=60) < 0
@@ -60,4 +63,4 @@ def test_who_stops_waits_for_none(two, monkeypatch):
 
 
 def test_no_solid_has_no_parts():
-    assert list(parts_of([], COACD, 0)) == []
+    assert list(parts_of([], COACD, 0, CONFIG)) == []

@@ -14,6 +14,7 @@ from exported import exported, swept
 from moveit_messages import read_scene
 
 from brrp_cli.api import open_result
+from brrp_cli.config.planning import TableBoxConfig
 from brrp_cli.geometry import transform_points
 from brrp_cli.grasping.hidden_space import NOTHING_HIDDEN
 from brrp_cli.grasping.plan import plan_grasps
@@ -71,7 +72,10 @@ def test_the_table_lies_beneath_where_the_plane_is_that_of_a_platform(folder):
     stored = open_result(folder.parent)
     bodies = [each.body for each in planned_objects(stored, PlanOptions(collision="hull"))]
     assert stored.plane is not None
-    usual, low = (table_under(bodies, stored.plane, Furniture(beneath=b)) for b in (0.0, 0.02))
+    usual, low = (
+        table_under(bodies, stored.plane, TableBoxConfig(), Furniture(beneath=b))
+        for b in (0.0, 0.02)
+    )
     assert usual.offset == pytest.approx(stored.plane.offset)
     assert low.offset == pytest.approx(stored.plane.offset + 0.02)
 

@@ -9,6 +9,7 @@ import numpy as np
 import trimesh
 from numpy.typing import NDArray
 
+from brrp_cli.config.planning import PartsConfig
 from brrp_cli.files import atomic_path
 from brrp_cli.ground_truth.true_meshes import exact_truth
 from brrp_cli.ground_truth.truth import TrueObject
@@ -53,7 +54,7 @@ def _parts(mesh: trimesh.Trimesh, cache: Path) -> list[Array]:
     vertices, faces = np.asarray(mesh.vertices), np.asarray(mesh.faces, dtype=np.int64)
     # CoACD takes half a minute for what is convex already.
     how = HULL if _off_its_hull(mesh) < CONCAVITY else COACD
-    parts = convex_parts(vertices, faces, how, 0, CONCAVITY)
+    parts = convex_parts(vertices, faces, how, 0, PartsConfig(concavity=CONCAVITY))
     with atomic_path(kept) as partial:
         np.savez_compressed(partial, *parts)
     return parts
