@@ -34,6 +34,9 @@ class FittedDepthConfig:
     gate : deviations from the plane before, beyond which a neighbour has no say
     fit : a surface fits if the variance about it is at most so many times that of the noise
     wave : share of the sensor's waves that counts as noise beside that of single pixels
+    least_neighbours : of its six coefficients' fit, and some more to tell whether it fits;
+    least_pivot : share of the neighbours' count, below which they lie in a line, or along the
+    mask's outline
     """
 
     reaches: tuple[float, float, float] = (0.003, 0.006, 0.012)
@@ -42,6 +45,8 @@ class FittedDepthConfig:
     gate: float = 3.0
     fit: float = 2.0
     wave: float = 0.5
+    least_neighbours: int = between(10, 7, 1000)
+    least_pivot: float = share(0.002)
 
 
 @dataclass(frozen=True)

@@ -55,17 +55,30 @@ class VerificationConfig:
 
 
 @dataclass(frozen=True)
+class MainAxesConfig:
+    """The principal axes of a stored object, about which it is turned beside those of its box.
+
+    alike : lengths of axes whose ratio is less: about none of them is a turn by itself
+    askew : radians, an axis that is turned from the box's by less is the box's
+    """
+
+    alike: float = 1.05
+    askew: float = 0.05
+
+
+@dataclass(frozen=True)
 class ColourConfig:
     """Which of the placements that depth cannot tell apart has the colours of the image.
 
-    The best placement is turned about each axis of its box and of its own in `turns` steps, both
-    ways up; the best are placed again, first those that are turned by `apart` radians from all
-    better ones. Of those whose alignment score is within `alike` of its own the one with the best
-    sum of alignment score and `worth` times the correlation of what is printed is taken, if that
-    gains `gain`: a box that one buys is not quite the one that was scanned. It counts in full from
-    a standard deviation of `printed` (of 255) on, and not at all under `unprinted`. Colours are
-    means over cells of `cell` metres, of at most `vertices` vertices, of which `least_seen` have to
-    be within `near` metres of the measured depth. asked : whether any of this is done
+    The best placement is turned about each axis of its box and of its own (`main_axes`) in `turns`
+    steps, both ways up; the best are placed again, first those that are turned by `apart` radians
+    from all better ones. Of those whose alignment score is within `alike` of its own the one with
+    the best sum of alignment score and `worth` times the correlation of what is printed is taken,
+    if that gains `gain`: a box that one buys is not quite the one that was scanned. It counts in
+    full from a standard deviation of `printed` (of 255) on, and not at all under `unprinted`.
+    Colours are means over cells of `cell` metres, of at most `vertices` vertices, of which
+    `least_seen` have to be within `near` metres of the measured depth. asked : whether any of this
+    is done
     """
 
     asked: bool = True
@@ -80,25 +93,26 @@ class ColourConfig:
     vertices: int = 4000
     least_seen: int = 40
     near: float = 0.01
+    main_axes: MainAxesConfig = field(default_factory=MainAxesConfig)
 
 
 @dataclass(frozen=True)
 class TurnConfig:
     """Placements of an object that looks almost alike when it is turned (registration/turned.py).
 
-    Tried are `turns` turns about each axis of its box and of its own, both ways up, and `any_turns`
-    of any kind, each followed by `onto_itself_steps` steps that bring `surface_points` of its
-    surface onto itself from `onto_itself` metres, under which their mean distance from it is less
-    than `itself`, metres; of those within `same_turn` radians and `same_shift` metres of another
-    one is enough. The `count` best of them by `coarse_points` observed points, first those that
-    are `apart` radians from all better ones, are refined, and the best `judged` held against
-    `points` observed ones, without those whose mean distance on the coarse field is longer than the
-    best one's by `worse` metres; distances beyond `far` metres count as that. One takes the place
-    of the first if it is better by `gain` standard errors. Those that are worse by no more than
-    `undecided` standard errors, in alignment score by no more than `alike`, and in the likelihood
-    of the frame by no more than `nats`, are as probable; of those that are worse by `refined_nats`
-    more at most, the best `refined` are refined first, as the first one was. The most probable of
-    all takes the place of the first.
+    Tried are `turns` turns about each axis of its box and of its own (`main_axes`), both ways up,
+    and `any_turns` of any kind, each followed by `onto_itself_steps` steps that bring
+    `surface_points` of its surface onto itself from `onto_itself` metres, under which their mean
+    distance from it is less than `itself`, metres; of those within `same_turn` radians and
+    `same_shift` metres of another one is enough. The `count` best of them by `coarse_points`
+    observed points, first those that are `apart` radians from all better ones, are refined, and the
+    best `judged` held against `points` observed ones, without those whose mean distance on the
+    coarse field is longer than the best one's by `worse` metres; distances beyond `far` metres
+    count as that. One takes the place of the first if it is better by `gain` standard errors. Those
+    that are worse by no more than `undecided` standard errors, in alignment score by no more than
+    `alike`, and in the likelihood of the frame by no more than `nats`, are as probable; of those
+    that are worse by `refined_nats` more at most, the best `refined` are refined first, as the
+    first one was. The most probable of all takes the place of the first.
     """
 
     turns: int = 36
@@ -122,6 +136,7 @@ class TurnConfig:
     refined_nats: float = 6.0
     refined: int = 3
     alike: float = 0.1
+    main_axes: MainAxesConfig = field(default_factory=MainAxesConfig)
 
 
 @dataclass(frozen=True)
@@ -147,7 +162,8 @@ class SearchConfig:
     best is kept, `kept` in all. An object is not placed at all where another one, with a score of
     `explained`, explains what is seen, and P(c|R) is less than a share `unlikely` of that one's.
     `near` and `tolerance` of `alignment_score` are no less than `waves` standard deviations of the
-    waves that the frame's depth has (observation/sensor_noise.py).
+    waves that the frame's depth has (observation/sensor_noise.py). How far what is seen reaches
+    along its plane is measured in `directions` directions, over half a turn.
     """
 
     turns: int = 24
@@ -156,6 +172,7 @@ class SearchConfig:
     least_facing: int = 6
     stray: float = share(0.02)
     box_points: int = 600
+    directions: int = 180
     hidden: float = 0.015
     first_share: int = 3
     matchings: int = 4

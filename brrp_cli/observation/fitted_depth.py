@@ -31,7 +31,15 @@ def smoothed(frame: Frame, object_id: int, noise: PixelNoise, config: FittedDept
     deviation = np.hypot(noise.fine[box].astype(np.float64), wave) / z**2
     pixels = [round(reach * frame.K[0, 0] / depth) for reach in config.reaches]
     radii = np.unique(np.clip(pixels, config.least_pixels, config.most_pixels)).astype(np.int64)
-    found = surfaces_fitted(1 / z, deviation, radii, config.gate, config.fit)
+    found = surfaces_fitted(
+        1 / z,
+        deviation,
+        radii,
+        config.gate,
+        config.fit,
+        config.least_neighbours,
+        config.least_pivot,
+    )
     points = frame.points.copy()
     points[box][own] *= (1 / (z * found))[own][:, None].astype(points.dtype)
     return frame.with_points(points)

@@ -9,15 +9,16 @@ from brrp_cli.compiled import compiled
 
 Array = NDArray[np.float64]
 
-# Of the six coefficients' fit, and some more to tell whether it fits.
-LEAST_NEIGHBOURS = 10.0
-# Share of the neighbours' count. Below it they lie in a line, or along the mask's outline.
-LEAST_PIVOT = 0.002
-
 
 @compiled
 def surfaces_fitted(
-    inverse: Array, deviation: Array, radii: NDArray[np.int64], gate: float, fit: float
+    inverse: Array,
+    deviation: Array,
+    radii: NDArray[np.int64],
+    gate: float,
+    fit: float,
+    least_neighbours: int,
+    least_pivot: float,
 ) -> Array:
     """Each pixel's value on the quadratic function of the pixel that fits its neighbours best.
 
@@ -27,6 +28,7 @@ def surfaces_fitted(
     gate : neighbours that are so many deviations off the plane through those of the radius before
         have no say; at first, three times as many off the pixel's own value
     fit : a function fits if the variance about it is at most so many times that of the noise
+    least_neighbours, least_pivot : as of `FittedDepthConfig`
     """
     height, width = inverse.shape
     found = inverse.copy()
@@ -44,7 +46,7 @@ def surfaces_fitted(
                 n, square, noise = _gathered(
                     inverse, deviation, row, column, radius, plane, reach, moments, right
                 )
-                if n < LEAST_NEIGHBOURS or not _decomposed(moments, LEAST_PIVOT * n, root):
+                if n < least_neighbours or not _decomposed(moments, least_pivot * n, root):
                     break
                 explained = _halfway(root, right, terms)
                 if square - explained > fit * noise * (n - 6.0) / n:

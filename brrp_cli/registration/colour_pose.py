@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from brrp_cli.config import ColourConfig
+from brrp_cli.config.registration import MainAxesConfig
 from brrp_cli.frames.frame import Frame
 from brrp_cli.frames.projection import pixel_numbers
 from brrp_cli.geometry import cells_of, transform_points, turns_about
@@ -23,9 +24,6 @@ from brrp_cli.registration.model import Model
 
 Array = NDArray[np.float64]
 
-# Lengths of principal axes in this ratio or less are alike; axes that are turned from the box's by
-# less, radians, are the box's.
-ALIKE, ASKEW = 1.05, 0.05
 # Brightness, red against green, both against blue: unit vectors at right angles.
 _OPPONENT = np.array([[1.0, 1.0, 1.0], [1.0, -1.0, 0.0], [0.5, 0.5, -1.0]])
 _OPPONENT /= np.linalg.norm(_OPPONENT, axis=1, keepdims=True)
@@ -47,7 +45,7 @@ def turns_about_itself(turns: int) -> Array:
     return np.asarray(every[np.sort(first)])
 
 
-def about_main_axes(surface: Array, turns: int) -> Array:
+def about_main_axes(surface: Array, turns: int, config: MainAxesConfig) -> Array:
     """(K, 4, 4) turns of a model about the principal axes of its surface (n, 3), both ways up, for
     those axes that are not alike and not the box's: a screwdriver that was scanned askew."""
     middle = surface.mean(axis=0)
@@ -57,8 +55,8 @@ def about_main_axes(surface: Array, turns: int) -> Array:
     found = []
     for i, axis in enumerate(axes.T):
         others = np.delete(length, i)
-        alike = np.maximum(others, length[i]) / np.minimum(others, length[i]) < ALIKE
-        if alike.any() or np.abs(axis).max() > np.cos(ASKEW):
+        alike = np.maximum(others, length[i]) / np.minimum(others, length[i]) < config.alike
+        if alike.any() or np.abs(axis).max() > np.cos(config.askew):
             continue
         turned = Rotation.from_rotvec(angles * axis)
         over = Rotation.from_rotvec(np.pi * axes[:, i - 1])

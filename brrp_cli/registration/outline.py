@@ -13,17 +13,13 @@ from brrp_cli.observation.support_plane import Plane, plane_frame
 
 Array = NDArray[np.float64]
 
-# Directions along the plane, over half a turn.
-DIRECTIONS = 180
-
 
 @dataclass(frozen=True)
 class Footprint:
     """How what is seen lies along its plane, without strays.
 
     plane; T_plane_cam : (4, 4); middle : (2,) of its box; top : its height, metres;
-    extents : (DIRECTIONS,) how far it reaches in directions evenly spread over half a turn, from x
-    on
+    extents : (n,) how far it reaches in directions evenly spread over half a turn, from x on
     """
 
     plane: Plane
@@ -35,7 +31,7 @@ class Footprint:
     def extent(self, directions: Array) -> Array:
         """How far it reaches in directions (B, 2), metres (B,)."""
         angle = np.arctan2(directions[:, 1], directions[:, 0])
-        at = np.arange(DIRECTIONS) * (np.pi / DIRECTIONS)
+        at = _half_turn(len(self.extents))
         return np.interp(angle, at, self.extents, period=np.pi)
 
 
@@ -84,7 +80,7 @@ def _footprint(points: Array, plane: Plane, config: SearchConfig) -> Footprint:
     T_plane_cam = plane_frame(plane)
     moved = transform_points(T_plane_cam, points[: config.box_points])
     seen = np.asarray(moved, dtype=np.float64)[:, :2]
-    angle = np.arange(DIRECTIONS) * (np.pi / DIRECTIONS)
+    angle = _half_turn(config.directions)
     low, high = _box(seen @ np.stack([np.cos(angle), np.sin(angle)]), config)
     return Footprint(
         plane=plane,
@@ -93,6 +89,11 @@ def _footprint(points: Array, plane: Plane, config: SearchConfig) -> Footprint:
         top=float(np.quantile(plane.signed_distance(points), 1 - config.stray)),
         extents=high - low,
     )
+
+
+def _half_turn(count: int) -> Array:
+    """(count,) radians, evenly spread."""
+    return np.asarray(np.arange(count) * (np.pi / count))
 
 
 def _box(points: Array, config: SearchConfig) -> Array:

@@ -154,7 +154,7 @@ def by_colour(
     turns = np.concatenate(
         [
             as_transforms(turns_about_itself(colour.turns)),
-            about_main_axes(model.surface, colour.turns),
+            about_main_axes(model.surface, colour.turns, colour.main_axes),
         ]
     )
     T = best.T_cam_model @ turns

@@ -133,7 +133,10 @@ def _nearly_itself(placed: Hypothesis, config: TurnConfig) -> Array:
         return known[1]
     surface = model.surface[: config.surface_points]
     start = np.concatenate(
-        [as_transforms(_every_turn(config)), about_main_axes(model.surface, config.turns)]
+        [
+            as_transforms(_every_turn(config)),
+            about_main_axes(model.surface, config.turns, config.main_axes),
+        ]
     )
     # Scanned things do not lie quite along the axes of their boxes.
     every = refine_to_sdf(start, surface, model, config.onto_itself, config.onto_itself_steps)

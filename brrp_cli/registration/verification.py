@@ -30,7 +30,7 @@ class Verifier:
     frame: Frame
     plane: Plane | None
     mask: SeenMask | None = None
-    _outlines: dict[tuple[int, float], Outline] = field(
+    _outlines: dict[tuple[int, float, int], Outline] = field(
         default_factory=dict, init=False, repr=False, compare=False
     )
 
@@ -41,7 +41,7 @@ class Verifier:
 
     def outline(self, config: SearchConfig) -> Outline:
         """How the points lie, found once for all models."""
-        key = config.box_points, config.stray
+        key = config.box_points, config.stray, config.directions
         if key not in self._outlines:
             self._outlines[key] = outline(self.points, self.plane, config)
         return self._outlines[key]

@@ -9,6 +9,7 @@ from sparse_depth import without_depth
 from table_scene import MESHES, TABLE, in_camera, photograph, placed, stored
 
 from brrp_cli.config import ColourConfig, SearchConfig
+from brrp_cli.config.registration import MainAxesConfig
 from brrp_cli.geometry import similarity, transform_points
 from brrp_cli.registration.colour_pose import (
     about_main_axes,
@@ -21,6 +22,7 @@ from brrp_cli.registration.pose_search import Hypothesis, by_colour
 from brrp_cli.registration.verification import Verifier
 
 CONFIG = ColourConfig()
+AXES = MainAxesConfig()
 
 
 def test_turns_begin_with_none_hold_upside_down_and_come_once() -> None:
@@ -170,7 +172,7 @@ def test_an_object_that_was_scanned_askew_turns_about_its_own_axes() -> None:
     bar = rng.uniform(-1, 1, (4000, 3)) * [0.10, 0.01, 0.01]
     askew = Rotation.from_rotvec([0.1, 0.2, 0.5])
     shift = np.array([0.02, 0.0, 0.01])
-    T = about_main_axes(askew.apply(bar) + shift, 4)
+    T = about_main_axes(askew.apply(bar) + shift, 4, AXES)
     assert len(T) == 8
     # In the bar's own frame, about its own middle.
     own = np.eye(4)
@@ -185,6 +187,6 @@ def test_an_object_that_was_scanned_askew_turns_about_its_own_axes() -> None:
 def test_an_object_that_lies_along_its_box_has_no_other_axes() -> None:
     rng = np.random.default_rng(0)
     box = rng.uniform(-1, 1, (4000, 3)) * [0.10, 0.05, 0.02]
-    assert about_main_axes(box, 4).shape == (0, 4, 4)
+    assert about_main_axes(box, 4, AXES).shape == (0, 4, 4)
     ball = rng.normal(size=(4000, 3))
-    assert about_main_axes(ball / np.linalg.norm(ball, axis=1)[:, None], 4).shape == (0, 4, 4)
+    assert about_main_axes(ball / np.linalg.norm(ball, axis=1)[:, None], 4, AXES).shape == (0, 4, 4)

@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 from brrp_cli.config import SearchConfig
 from brrp_cli.geometry import transform_points
 from brrp_cli.observation.support_plane import Plane, plane_frame
-from brrp_cli.registration.outline import DIRECTIONS, outline, principal_axes
+from brrp_cli.registration.outline import outline, principal_axes
 
 WHOLE = SearchConfig(box_points=10**6, stray=0.0)
 # 0.7 m ahead of a camera that looks down at an angle.
@@ -41,7 +41,7 @@ def test_a_box_reaches_as_far_as_its_sides():
     ways = np.stack([np.cos(angles), np.sin(angles)], axis=1)
     expected = np.abs(np.cos(angles - TURN)) * SIDES[0] + np.abs(np.sin(angles - TURN)) * SIDES[1]
     # Straight between two directions, which cuts the kink at a right angle to a side.
-    apart = np.pi / DIRECTIONS
+    apart = np.pi / WHOLE.directions
     assert found.extent(ways) == pytest.approx(expected, abs=SIDES[0] * apart / 2)
     assert np.median(np.abs(found.extent(ways) - expected)) < SIDES[0] * apart**2
 
