@@ -270,6 +270,24 @@ class CompletionConfig:
 
 
 @dataclass(frozen=True)
+class SpreadConfig:
+    """How uncertain a surface's place is, from how steeply occupancy falls across it. Metres.
+
+    steep : up to here the deviation is what the steepness says. Beyond, occupancy has to reach 0
+    and 1 within the size of an object, and falls faster elsewhere than where it is 0.5: the
+    deviation grows with the power `growth` of what the steepness says, fitted to 208 objects of
+    made scenes (docs/sensors.md)
+    most : no surface is less certain than this
+    step : half of the difference quotients' step
+    """
+
+    steep: float = 0.005
+    growth: float = share(0.6)
+    most: float = 0.02
+    step: float = 0.001
+
+
+@dataclass(frozen=True)
 class FittedMapConfig:
     """A Hilbert map whose hinge points fill the box of what was seen and of the hypotheses.
 
@@ -280,6 +298,7 @@ class FittedMapConfig:
     a completed one; contradiction : a sample that a placed shape cannot explain by the noise counts
     so many times, for there are few of them among all that was seen to be free around it;
     least_weight : hypotheses that weigh less are left out
+    spread : what its steepness says of a surface's place
     """
 
     hinges: int = 1000
@@ -297,3 +316,4 @@ class FittedMapConfig:
     stiffness: float = 8.0
     contradiction: float = 1000.0
     least_weight: float = share(0.01)
+    spread: SpreadConfig = field(default_factory=SpreadConfig)

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import astuple, dataclass, field, replace
 from typing import TYPE_CHECKING, ClassVar, Protocol
 
 import numpy as np
 import torch
 from numpy.typing import NDArray
 
+from brrp_cli.config.inference import SpreadConfig
 from brrp_cli.geometry import moved_box
 from brrp_cli.inference.mean_grid import MeanGrid
 from brrp_cli.inference.placed_shape import PlacedShape
@@ -19,16 +20,6 @@ if TYPE_CHECKING:
     import h5py
 
     from brrp_cli.hdf5 import SharedParts
-
-# Metres: up to here the deviation of a surface is what its steepness says. Beyond, occupancy has to
-# reach 0 and 1 within the size of an object, and falls faster elsewhere than where it is 0.5: the
-# deviation grows with this power of what the steepness says, fitted to 208 objects of made scenes
-# (docs/sensors.md).
-LOCAL, GROWTH = 0.005, 0.6
-# No surface is less certain than this, metres.
-LARGEST = 0.02
-# Half of the difference quotients' step, metres.
-STEP = 0.001
 
 
 class MeanFunction(Protocol):
@@ -65,6 +56,7 @@ class HypothesisPosterior:
     frame, outside of which nothing is occupied
     common : metres, standard deviation of what the depth that a completed shape was made of is off
     over centimetres: no sample tells of it. A placed shape has it in its pose's covariance.
+    spread : what the steepness of occupancy says of a surface's place
     """
 
     kind: ClassVar[str] = "hypotheses"
@@ -75,6 +67,7 @@ class HypothesisPosterior:
     correction: HilbertPosterior
     box: NDArray[np.float64]
     common: float = 0.0
+    spread: SpreadConfig = field(default_factory=SpreadConfig)
 
     @property
     def bounds(self) -> NDArray[np.float64]:
@@ -202,21 +195,25 @@ class HypothesisPosterior:
             found[inside] = self.mean_occupancy(logits)
             return found
 
+        half = self.spread.step
         gradient = [
-            (occupied(vertices + step) - occupied(vertices - step)) / (2 * STEP)
-            for step in np.eye(3) * STEP
+            (occupied(vertices + step) - occupied(vertices - step)) / (2 * half)
+            for step in np.eye(3) * half
         ]
         placed = np.array([isinstance(mean, PlacedShape) for mean in self.means])
         completed = float(self.weights[~placed].sum())
-        found = deviation(np.linalg.norm(gradient, axis=0))
+        found = deviation(np.linalg.norm(gradient, axis=0), self.spread)
         return np.hypot(found, np.float32(self.common * np.sqrt(completed)))
 
     def write(self, group: h5py.Group, shared: SharedParts) -> None:
         """The correction as its class writes it, and which (P,) int64, shares (P,) float64, box (2,
-        3), means/0, 1, ... as their classes write them, with their kind."""
+        3), means/0, 1, ... as their classes write them, with their kind; spread (4,) where it is
+        not the usual one."""
         self.correction.write(group, shared)
         group.attrs["box"] = self.box
         group.attrs["common"] = self.common
+        if self.spread != SpreadConfig():
+            group.attrs["spread"] = astuple(self.spread)
         for name, values in (("which", self.which), ("shares", self.shares)):
             group.create_dataset(name, data=values, chunks=values.shape, fletcher32=True)
         for number, mean in enumerate(self.means):
@@ -240,6 +237,7 @@ class HypothesisPosterior:
             HilbertPosterior.read(group, shared),
             np.asarray(group.attrs["box"], dtype=np.float64),
             float(group.attrs["common"]),
+            _spread_of(group),
         )
 
 
@@ -248,11 +246,20 @@ _KINDS: dict[str, type[MeanGrid] | type[PlacedShape]] = {
 }
 
 
-def deviation(steepness: NDArray[np.floating]) -> NDArray[np.float32]:
+def _spread_of(group: h5py.Group) -> SpreadConfig:
+    """Errors: ValueError."""
+    if "spread" not in group.attrs:
+        return SpreadConfig()
+    steep, growth, most, step = (float(each) for each in group.attrs["spread"])
+    return SpreadConfig(steep, growth, most, step)
+
+
+def deviation(steepness: NDArray[np.floating], config: SpreadConfig) -> NDArray[np.float32]:
     """Standard deviation (n,), metres, of the place of a surface across which occupancy falls by
     `steepness` (n,), 1/metre: that of a logistic function, which is steepest by a quarter of its
-    logit, up to `LOCAL`."""
+    logit, as far as `config` lets it be that."""
     with np.errstate(divide="ignore"):
         found = LOGISTIC_DEVIATION / (4 * steepness)
-    told = np.where(found < LOCAL, found, LOCAL * (found / LOCAL) ** GROWTH)
-    return np.asarray(np.minimum(told, LARGEST), dtype=np.float32)
+    steep = config.steep
+    told = np.where(found < steep, found, steep * (found / steep) ** config.growth)
+    return np.asarray(np.minimum(told, config.most), dtype=np.float32)

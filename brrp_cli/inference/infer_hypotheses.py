@@ -97,7 +97,7 @@ def infer_correction(
     reach = float((problem.box[1] - problem.box[0]).max() / 2)
     correction = HilbertPosterior(weights.cpu().numpy(), center, grid, reach)
     return HypothesisPosterior(
-        problem.means, which, shares, correction, problem.box, problem.common
+        problem.means, which, shares, correction, problem.box, problem.common, config.spread
     )
 
 

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brrp_cli.config import SurfaceConfig
+from brrp_cli.config.inference import SpreadConfig
 from brrp_cli.dependencies import import_open3d
 from brrp_cli.inference.hypothesis_posterior import HypothesisPosterior, MeanFunction, deviation
 from brrp_cli.inference.placed_shape import PlacedShape
@@ -28,7 +29,8 @@ class AlongNormals:
     ascending; particles : (P, steps, n) occupancy of each particle; mean : (steps, n), over all of
     them; own : (steps, n), over those of the placed shape alone; beyond : (n,) metres from the end
     of the way to where the latter falls through 0.5, 0 where it does on the way; apart : (n,)
-    metres, root mean square over all hypotheses of how far their surfaces are
+    metres, root mean square over all hypotheses of how far their surfaces are; spread : of the
+    posterior
     """
 
     vertices: Array
@@ -39,6 +41,7 @@ class AlongNormals:
     own: NDArray[np.float32]
     beyond: Array
     apart: Array
+    spread: SpreadConfig
 
 
 @dataclass(frozen=True)
@@ -103,6 +106,7 @@ def along_normals(
         own.astype(np.float32),
         beyond,
         np.sqrt(apart),
+        posterior.spread,
     )
 
 
@@ -147,7 +151,7 @@ def moved_to_level(
     steepness = np.where(crossed, gap / np.maximum(end - start, 1e-9), 0.0)
     return Moved(
         through.vertices + offset[:, None] * through.normals,
-        deviation(steepness),
+        deviation(steepness, through.spread),
         float(1 - crossed.mean()),
     )
 

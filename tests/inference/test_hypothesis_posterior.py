@@ -10,10 +10,11 @@ import pytest
 import trimesh
 from closed_shapes import at
 
+from brrp_cli.config.inference import SpreadConfig
 from brrp_cli.errors import BrrpError
 from brrp_cli.geometry import similarity
 from brrp_cli.inference.hinge import HingeGrid
-from brrp_cli.inference.hypothesis_posterior import GROWTH, LARGEST, LOCAL, HypothesisPosterior
+from brrp_cli.inference.hypothesis_posterior import HypothesisPosterior
 from brrp_cli.inference.mean_grid import MeanGrid
 from brrp_cli.inference.placed_shape import PlacedShape
 from brrp_cli.inference.posterior import HilbertPosterior
@@ -23,6 +24,7 @@ from brrp_cli.results.posterior_file import save_posteriors
 CENTER = np.array([0.1, -0.2, 0.9])
 GRID = HingeGrid((-0.05, -0.05, -0.05), (3, 3, 3), 0.05, 1e-7)
 SPACING = 0.0025
+SPREAD = SpreadConfig()
 
 
 def of_means(means, box, which=None, shares=None, weights=0.0):
@@ -81,12 +83,26 @@ def test_the_spread_of_a_logistic_surface_is_that_of_its_distribution(width):
 
 
 def test_a_surface_that_is_little_known_is_not_told_to_be_anywhere():
-    """Beyond `LOCAL`, twice as gentle a slope makes the spread 2^0.6 times as large."""
+    """Beyond `steep`, twice as gentle a slope makes the spread 2^0.6 times as large."""
     one, two = (
         posterior(ramp(each)).surface_uncertainty(CENTER[None])[0] for each in (0.005, 0.01)
     )
-    assert one == pytest.approx(LOCAL * (np.pi * 0.005 / np.sqrt(3) / LOCAL) ** GROWTH, rel=0.05)
-    assert two / one == pytest.approx(2**GROWTH, rel=0.05)
+    own, steep = np.pi * 0.005 / np.sqrt(3), SPREAD.steep
+    assert one == pytest.approx(steep * (own / steep) ** SPREAD.growth, rel=0.05)
+    assert two / one == pytest.approx(2**SPREAD.growth, rel=0.05)
+
+
+def test_another_spread_is_asked_for_and_kept(tmp_path):
+    gentle = posterior(ramp(0.01))
+    other = replace(gentle, spread=SpreadConfig(steep=0.004, growth=0.5, most=0.009))
+    found = other.surface_uncertainty(CENTER[None])
+    own = np.pi * 0.01 / np.sqrt(3)
+    assert found[0] == pytest.approx(0.004 * (own / 0.004) ** 0.5, rel=0.05)
+    assert found < gentle.surface_uncertainty(CENTER[None])
+    save_posteriors({1: other, 2: gentle}, tmp_path / "a.h5")
+    read = open_posterior(tmp_path / "a.h5")
+    assert (read[1].spread, read[2].spread) == (other.spread, SPREAD)
+    np.testing.assert_array_equal(read[1].surface_uncertainty(CENTER[None]), found)
 
 
 def test_the_spread_does_not_depend_on_which_way_the_surface_faces():
@@ -125,7 +141,7 @@ def test_what_depth_is_off_alike_is_added_to_completed_surfaces_in_squares(shape
 
 def test_where_nothing_says_where_the_surface_is_the_spread_is_the_largest():
     flat = posterior(lambda x: np.zeros_like(x))
-    assert flat.surface_uncertainty(CENTER[None])[0] == pytest.approx(LARGEST)
+    assert flat.surface_uncertainty(CENTER[None])[0] == pytest.approx(SPREAD.most)
 
 
 def test_probability_is_the_weighted_mean_over_particles_of_mean_and_correction():
