@@ -32,7 +32,8 @@ class WallConfig:
 
     square : degrees by which their angles may differ from right ones; near : metres from a plane of
     its own points; in_front : part of the table's points that lies on one side of a wall
-    cell : metres of the grid along it; spans : part of the table's length that a wall goes along
+    cell : metres of the grid along it; spans : part of the table's length that a wall goes along,
+    without `strays` percent of its points at either end
     border : part of the image's border, `border_width` pixels of it, that a wall fills which does
     not go along so much
     board_above : metres above the table of a board over it, at least; covers : part of the table
@@ -45,6 +46,7 @@ class WallConfig:
     in_front: float = between(0.9, 0.5, 1.0)
     cell: float = 0.02
     spans: float = share(0.5)
+    strays: float = between(1.0, 0.0, 49.0)
     border: float = share(0.1)
     border_width: int = between(16, 1, 1000)
     board_above: float = 0.12

@@ -92,7 +92,8 @@ class FootprintsConfig:
     inward, facing : mean cosine to the middle: of an inside that shares the footprint, and of
         walls of which one is seen from within and one from without (of a round one 0.9)
     round : part of both footprints that the hull around them may hold besides
-    above : metres by which an inside may rise over its outside
+    above : metres by which an inside may rise over its outside; highest : percentile of the
+        heights of one that counts as how far it rises
     """
 
     cell: float = 0.003
@@ -102,6 +103,7 @@ class FootprintsConfig:
     facing: float = between(0.7, -1.0, 1.0)
     round: float = 0.45
     above: float = 0.02
+    highest: float = between(95.0, 50.0, 100.0)
 
 
 @dataclass(frozen=True)
@@ -126,7 +128,8 @@ class StacksConfig:
     """Things of plain colour stacked flush.
 
     lightness : weight of CIE L* beside a* and b*: shading changes it
-    step : metres of the heights at which a cut is looked for; least_height : metres on both sides
+    step : metres of the heights at which a cut is looked for, without `strays` percent of them at
+        either end; least_height : metres on both sides
     apart : distance of both sides' colours; plain : part of the variance of colour that lies
         between both sides at least
     beside : metres on both sides of the seam in which their widths are compared; width : the
@@ -135,6 +138,7 @@ class StacksConfig:
 
     lightness: float = 0.5
     step: float = 0.004
+    strays: float = between(2.0, 0.0, 49.0)
     least_height: float = 0.025
     apart: float = 20.0
     plain: float = share(0.75)
@@ -264,12 +268,14 @@ class SegmentConfig:
         `sigmas` deviations of the table's own height, which grow with the square of the distance;
         beyond `far` metres, max_height grows so, too
     rim : pixels that rise that part of it join an object within `reach`
+    least_depth : part of the image that must have depth which neighbours agree on
     margin : how far beside the seen table an object may stand
     min_area : objects that show less of themselves are dropped, metres squared; sure_part : that
         part of it is enough of what the network takes for an object with a probability of `sure`,
         on average
     """
 
+    least_depth: float = share(0.01)
     min_height: float = 0.004
     max_height: float = 0.015
     far: float = 1.2

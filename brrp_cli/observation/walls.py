@@ -77,7 +77,7 @@ def walls_of(
         along = normalise(np.cross(table.plane.normal, patch.plane.normal))
         # A face of a thing may go along all of a table that shows little of itself.
         spans = patch.across >= support.across
-        spans &= _covers(rises @ along, flat @ along, config.cell) >= config.spans
+        spans &= _covers(rises @ along, flat @ along, config) >= config.spans
         found.append(Wall(patch, in_front < 0.5, spans))
     return tuple(found)
 
@@ -117,9 +117,9 @@ def _on(table: Patch, points: Array, near: float) -> Array:
     return flat[table.holds(table.plan(flat), 0.0)]
 
 
-def _covers(some: Array, others: Array, cell: float) -> float:
+def _covers(some: Array, others: Array, config: WallConfig) -> float:
     """The share of the cells from end to end of `others` (n,), metres, that hold some of (m,)."""
-    low, high = np.percentile(others, (1, 99))
-    count = max(int(np.ceil((high - low) / cell)), 1)
+    low, high = np.percentile(others, (config.strays, 100 - config.strays))
+    count = max(int(np.ceil((high - low) / config.cell)), 1)
     inside = some[(some >= low) & (some < high)]
-    return len(np.unique(((inside - low) / cell).astype(np.int64))) / count
+    return len(np.unique(((inside - low) / config.cell).astype(np.int64))) / count

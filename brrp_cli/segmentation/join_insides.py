@@ -85,7 +85,7 @@ def _standing(
         box=(cells.min(axis=0), cells.max(axis=0)),
         plan=plan[known],
         normals=normals[known],
-        high=float(np.percentile(height[mask], 95)),
+        high=float(np.percentile(height[mask], config.highest)),
     )
 
 

@@ -19,9 +19,6 @@ from brrp_cli.segmentation.table_plane import Table
 
 Array = NDArray[np.floating]
 
-# Of the image, that must have depth which agrees with its neighbours'.
-MIN_SHARE = 0.01
-
 
 @dataclass(frozen=True)
 class SeenSurfaces:
@@ -53,11 +50,12 @@ def see_surfaces(frame: Frame, seed: int, config: SegmentConfig) -> SeenSurfaces
     depth = smoothed(frame, config)
     points = backproject(depth, frame.K)
     valid = np.isfinite(depth)
-    if valid.sum() < MIN_SHARE * valid.size:
+    if valid.sum() < config.least_depth * valid.size:
         raise FrameError(
             "Too little depth to find objects in",
             where=frame.source,
-            expected=f"depth that neighbours agree on, at {MIN_SHARE:.0%} of the pixels or more",
+            expected="depth that neighbours agree on, at"
+            f" {config.least_depth:.0%} of the pixels or more",
             found=f"{int(frame.valid.sum())} of {valid.size} pixels have depth,"
             f" {int(valid.sum())} of them agree with their neighbours",
             fix="check the depth image and its unit; masks made elsewhere go in by --masks",

@@ -49,7 +49,7 @@ def seam_height(
     The cut is where most of the variance of colour lies between both sides (Otsu's criterion, IEEE
     SMC 1979, over heights). colours : (n, 3); height : (n,) metres
     """
-    low, high = np.percentile(height, (2, 98))
+    low, high = np.percentile(height, (config.strays, 100 - config.strays))
     if high - low < 2 * config.least_height:
         return None
     bins = np.floor((height - low) / config.step).astype(np.int64)
