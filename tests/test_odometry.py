@@ -11,7 +11,7 @@ from test_tracking import inferred as inferred
 from brrp_cli import Reconstructor
 from brrp_cli.config.tracking import TrackConfig
 from brrp_cli.geometry import transform_points
-from brrp_cli.tracking.motion import background_stands, camera_motion, edge_motion, stands
+from brrp_cli.tracking.motion import background_stands, camera_motion, camera_stands, edge_motion
 from brrp_cli.tracking.odometry import Odometry, replace_pose
 
 TRACK = TrackConfig()
@@ -79,7 +79,7 @@ def test_before_a_camera_that_stands_nothing_has_moved_but_what_was():
     )
     for frame in frames[1:]:
         T = camera_motion(frames[0], frame, TRACK)
-        assert stands(T, TRACK)
+        assert camera_stands(T, TRACK)
         np.testing.assert_array_equal(T, np.eye(4))
 
 
@@ -88,7 +88,7 @@ def test_after_a_jump_another_stream_begins():
     streams = [frame.stream_pose.stream for frame in frames]
     assert streams[0] != streams[1] == streams[2]
     assert camera_motion(frames[0], frames[1], TRACK) is None
-    assert stands(camera_motion(frames[1], frames[2], TRACK), TRACK)
+    assert camera_stands(camera_motion(frames[1], frames[2], TRACK), TRACK)
 
 
 def test_another_image_size_begins_another_stream():

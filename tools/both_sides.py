@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from brrp_cli.reconstruction import Surface
-from brrp_cli.rendering.render import View, fitted, render, view_from_behind
+from brrp_cli.rendering.render import PinholeView, fitted, render, view_from_behind
 from brrp_cli.results.read import StoredResult
 
 SAMPLES = 2  # rays of a pixel along each axis
@@ -24,12 +24,12 @@ def both_sides(
     up = -result.T_frame_cam[:3, 1] if result.plane is None else result.plane.normal
     size = pixels * SAMPLES
     K = np.array([[size, 0, size / 2], [0, size, size / 2], [0, 0, 1.0]])
-    front = _towards(View(K, T_cam_frame, (size, size)), centre)
+    front = _towards(PinholeView(K, T_cam_frame, (size, size)), centre)
     views = (front, view_from_behind(front, centre, up))
     return [_drawn(surfaces, fitted(view, surfaces), pixels) for view in views]
 
 
-def _towards(view: View, target: NDArray[np.floating]) -> View:
+def _towards(view: PinholeView, target: NDArray[np.floating]) -> PinholeView:
     """The view turned so that `target` (3,) lies in its middle: what lies at the image's border
     would be drawn askew."""
     seen = view.T_view_cam[:3, :3] @ target + view.T_view_cam[:3, 3]
@@ -38,10 +38,10 @@ def _towards(view: View, target: NDArray[np.floating]) -> View:
     x /= np.linalg.norm(x)
     T = np.eye(4)
     T[:3, :3] = np.stack([x, np.cross(z, x), z])
-    return View(view.K, T @ view.T_view_cam, view.shape)
+    return PinholeView(view.K, T @ view.T_view_cam, view.shape)
 
 
-def _drawn(surfaces: list[Surface], view: View, pixels: int) -> NDArray[np.uint8]:
+def _drawn(surfaces: list[Surface], view: PinholeView, pixels: int) -> NDArray[np.uint8]:
     """Smoothed at the edges."""
     colours = [surface.colours for surface in surfaces if surface.colours is not None]
     assert len(colours) == len(surfaces)

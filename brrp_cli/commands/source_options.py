@@ -17,7 +17,7 @@ from brrp_cli.spoken import counted
 
 if TYPE_CHECKING:
     from brrp_cli.config.segmentation import SegmentConfig
-    from brrp_cli.frames.format import Request
+    from brrp_cli.frames.format import FrameRequest
     from brrp_cli.frames.frame import Frame
     from brrp_cli.segmentation.prompted.segment_by_prompt import PromptSegmenter
 
@@ -144,11 +144,11 @@ class SourceOptions:
         return origin.with_name(origin.stem if origin.is_file() else origin.resolve().name)
 
     @property
-    def request(self) -> Request:
+    def request(self) -> FrameRequest:
         """What is asked for beside the path."""
-        from brrp_cli.frames.format import Request
+        from brrp_cli.frames.format import FrameRequest
 
-        return Request(
+        return FrameRequest(
             index=self.index,
             depth_scale=self.depth_scale,
             intrinsics=self.intrinsics,

@@ -56,7 +56,7 @@ def network_grid(
     return asked
 
 
-def within(
+def logits_within(
     guess: Floats, empty: NDArray[np.bool_], bounds: Bounds, config: MeanConfig
 ) -> NDArray[np.float16]:
     """Logits (nx, ny, nz), limited: the network's `guess` (nx, ny, nz), the least where it is

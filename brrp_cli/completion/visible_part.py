@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from brrp_cli.completion.convex_hull import hull_facets, outside_hull
-from brrp_cli.completion.footprint import Footprint, footprint
 from brrp_cli.completion.height_map import HeightMap, height_map_over
+from brrp_cli.completion.plan_rectangle import PlanRectangle, plan_rectangle
 from brrp_cli.completion.radial_profile import RadialProfile, radial_profile
 from brrp_cli.completion.silhouette import Image, silhouettes
 from brrp_cli.config import CompletionConfig
@@ -63,7 +63,7 @@ class VisiblePart:
     width: float
     depths: Array
     normals: Array
-    rectangle: Footprint
+    rectangle: PlanRectangle
     profile: RadialProfile
     free: float
     silhouette: Image
@@ -147,7 +147,7 @@ def visible_part(
         width=width,
         depths=-outside_hull(seen, facets),
         normals=normals,
-        rectangle=footprint(np.stack([seen @ across, seen @ ahead], axis=1), config),
+        rectangle=plan_rectangle(np.stack([seen @ across, seen @ ahead], axis=1), config),
         profile=radial_profile(seen @ up, radii, outward, config.levels),
         free=_free_between(seen, frame, config),
         silhouette=silhouette,

@@ -16,7 +16,7 @@ _DIGITS = 19
 
 
 @dataclass(frozen=True)
-class Request:
+class FrameRequest:
     """What a user asks for beside the path; None = the format decides.
 
     index : which frame of many: its number from 0, or the name that the format gives it
@@ -62,9 +62,9 @@ class Format:
     title: str
     layout: str
     matches: Callable[[Path], bool]
-    read: Callable[[Path, Request], Frame]
-    names: Callable[[Path, Request], list[str]] | None = None
-    contents: Callable[[Path, Request], list[str]] | None = None
+    read: Callable[[Path, FrameRequest], Frame]
+    names: Callable[[Path, FrameRequest], list[str]] | None = None
+    contents: Callable[[Path, FrameRequest], list[str]] | None = None
     last: bool = False
 
 

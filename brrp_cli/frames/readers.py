@@ -9,7 +9,7 @@ from pathlib import Path
 
 from brrp_cli.errors import FrameError
 from brrp_cli.frames import formats
-from brrp_cli.frames.format import Format, Request
+from brrp_cli.frames.format import Format, FrameRequest
 from brrp_cli.frames.frame import Frame
 
 
@@ -28,7 +28,7 @@ def matching(path: Path) -> list[Format]:
 
 
 def read_frame(
-    path: str | Path, *, depth_scale: float | None = None, request: Request | None = None
+    path: str | Path, *, depth_scale: float | None = None, request: FrameRequest | None = None
 ) -> Frame:
     """Read a frame file (.npz, with or without masks), or a frame of any other known format.
 
@@ -37,11 +37,11 @@ def read_frame(
 
     Errors: FrameError, with the formats that are known where the path is of none or of several.
     """
-    request = request or Request(depth_scale=depth_scale)
+    request = request or FrameRequest(depth_scale=depth_scale)
     return format_of(Path(path)).read(Path(path), request)
 
 
-def list_frames(path: str | Path, request: Request | None = None) -> list[str]:
+def list_frames(path: str | Path, request: FrameRequest | None = None) -> list[str]:
     """The frames of a source, as `Request.index` names them, in their order.
 
     A source of one frame has one, by the name of its file or folder. Errors: as of `read_frame`.
@@ -50,7 +50,7 @@ def list_frames(path: str | Path, request: Request | None = None) -> list[str]:
     found = format_of(path)
     if found.names is None:
         return [path.resolve().stem if path.is_file() else path.resolve().name]
-    return found.names(path, request or Request())
+    return found.names(path, request or FrameRequest())
 
 
 def format_of(path: Path) -> Format:

@@ -6,7 +6,7 @@ import logging
 from pathlib import Path
 
 from brrp_cli.errors import FrameError
-from brrp_cli.frames.format import Format, Request, pick
+from brrp_cli.frames.format import Format, FrameRequest, pick
 from brrp_cli.frames.frame import Frame
 from brrp_cli.frames.images import read_images
 
@@ -20,7 +20,7 @@ def recording(title: str, intrinsics: str, unit: str) -> Format:
     """The format of a folder with color/NAME.jpg, depth/NAME.png, aligned to the colour camera, and
     the file `intrinsics` of that camera. unit : as in `read_pair`."""
 
-    def read(folder: Path, request: Request) -> Frame:
+    def read(folder: Path, request: FrameRequest) -> Frame:
         """The frame that --index names or counts, the first else. Errors: FrameError."""
         return read_pair(pairs_below(folder), folder / intrinsics, request, folder, unit)
 
@@ -48,7 +48,11 @@ def images_in(folder: Path, endings: tuple[str, ...]) -> dict[str, Path]:
 
 
 def read_pair(
-    pairs: dict[str, tuple[Path, Path]], intrinsics: Path, request: Request, where: Path, unit: str
+    pairs: dict[str, tuple[Path, Path]],
+    intrinsics: Path,
+    request: FrameRequest,
+    where: Path,
+    unit: str,
 ) -> Frame:
     """One of the pairs of colour and depth images; integers of depth are millimetres unless the
     user says otherwise, which is said. Errors: FrameError.

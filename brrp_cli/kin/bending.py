@@ -20,7 +20,7 @@ Array = NDArray[np.float64]
 
 # Those of a stretched shape; then the bend's coefficients.
 FIRST = unknowns.UNKNOWNS
-UNKNOWNS = FIRST + 3 * bend.TERMS
+BENT_UNKNOWNS = FIRST + 3 * bend.TERMS
 
 
 @dataclass(frozen=True)
@@ -135,7 +135,7 @@ def bent(
     cost, H, g = _system(fit, points, normals, evidence, precision, config)
     damping = config.bend_damping
     for _ in range(config.bend_steps):
-        held = H + damping * np.diag(np.diag(H)) + unknowns.LEAST * np.eye(UNKNOWNS)
+        held = H + damping * np.diag(np.diag(H)) + unknowns.LEAST_WEIGHT * np.eye(BENT_UNKNOWNS)
         step = -np.asarray(np.linalg.solve(held, g), dtype=np.float64)
         tried = fit.stepped(step, config)
         found = _system(tried, points, normals, evidence, precision, config)
@@ -193,7 +193,7 @@ def _add(H: Array, g: Array, rows: Array, residual: Array, weight: Array) -> Non
 
 def _prior(fit: BentFit, precision: Array, config: KinConfig) -> tuple[float, Array, Array]:
     """Of the stretched shape and of the bend."""
-    H, g = np.zeros((UNKNOWNS, UNKNOWNS)), np.zeros(UNKNOWNS)
+    H, g = np.zeros((BENT_UNKNOWNS, BENT_UNKNOWNS)), np.zeros(BENT_UNKNOWNS)
     cost, first_H, first_g = unknowns.size_prior(
         fit.half[None],
         fit.stored_half[None],

@@ -12,7 +12,7 @@ from brrp_cli.config import KinConfig
 from brrp_cli.geometry import bell, transform_points
 from brrp_cli.kin.evidence import Evidence
 from brrp_cli.kin.library import Library
-from brrp_cli.kin.placement import Placements, distance_and_slopes
+from brrp_cli.kin.placement import KinPlacements, distance_and_slopes
 from brrp_cli.kin.proposals import starts
 from brrp_cli.kin.refine import refined
 
@@ -29,7 +29,7 @@ class Fits:
     the logarithms of the scales; score : of all of it
     """
 
-    placements: Placements
+    placements: KinPlacements
     near: Floats
     far: Floats
     violation: Floats
@@ -53,7 +53,9 @@ class Fits:
         )
 
 
-def judged(placements: Placements, evidence: Evidence, library: Library, config: KinConfig) -> Fits:
+def judged(
+    placements: KinPlacements, evidence: Evidence, library: Library, config: KinConfig
+) -> Fits:
     """Placements with their scores, in their order."""
     distance = distance_and_slopes(
         placements, np.concatenate([evidence.seen, evidence.free]), library
@@ -83,7 +85,7 @@ def judged(placements: Placements, evidence: Evidence, library: Library, config:
 
 
 def _violation(
-    placements: Placements, evidence: Evidence, library: Library, config: KinConfig
+    placements: KinPlacements, evidence: Evidence, library: Library, config: KinConfig
 ) -> Floats:
     """Share (B,) of the surface that lies in front of the measured depth, or below the plane."""
     placed = placements.placed(library.surface[placements.stance]).reshape(3, -1).T
@@ -112,7 +114,7 @@ def fit_kin(evidence: Evidence, library: Library, config: KinConfig) -> Fits:
 
 
 def _best(
-    placements: Placements, evidence: Evidence, library: Library, config: KinConfig, count: int
+    placements: KinPlacements, evidence: Evidence, library: Library, config: KinConfig, count: int
 ) -> Fits:
     """The `count` best, best first."""
     fits = judged(placements, evidence, library, config)

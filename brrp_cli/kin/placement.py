@@ -19,7 +19,7 @@ Floats = NDArray[np.float32]
 
 
 @dataclass(frozen=True)
-class Placements:
+class KinPlacements:
     """stance : (B,) rows of the library; turn : (B,) radians; middle, half : (B, 3) metres;
     taper : (B,)"""
 
@@ -32,8 +32,8 @@ class Placements:
     def __len__(self) -> int:
         return len(self.stance)
 
-    def __getitem__(self, rows: NDArray[np.integer]) -> Placements:
-        return Placements(
+    def __getitem__(self, rows: NDArray[np.integer]) -> KinPlacements:
+        return KinPlacements(
             self.stance[rows],
             self.turn[rows],
             self.middle[rows],
@@ -67,13 +67,13 @@ class Placements:
         return np.stack([c * x - s * y, s * x + c * y, z]) + self.middle.T[:, :, None]
 
 
-def joined(each: list[Placements]) -> Placements:
+def joined(each: list[KinPlacements]) -> KinPlacements:
     """All of them, in order."""
     columns = zip(*((p.stance, p.turn, p.middle, p.half, p.taper) for p in each), strict=True)
-    return Placements(*(np.concatenate(column) for column in columns))
+    return KinPlacements(*(np.concatenate(column) for column in columns))
 
 
-def coarse_distance(placements: Placements, points: Floats, library: Library) -> Floats:
+def coarse_distance(placements: KinPlacements, points: Floats, library: Library) -> Floats:
     """Distance (B, n), metres, of points (n, 3), frame of the plane, from the coarse fields."""
     ratio = (library.half[placements.stance] / placements.half) ** 2
     return coarse_distances(
@@ -92,7 +92,7 @@ def coarse_distance(placements: Placements, points: Floats, library: Library) ->
 
 
 def distance_and_slopes(
-    placements: Placements, points: Floats, library: Library
+    placements: KinPlacements, points: Floats, library: Library
 ) -> tuple[Floats, Floats, Floats, Floats]:
     """Distance (B, n), metres, of points (n, 3); u (3, B, n); and the slope of the distance along u
     (3, B, n) and, unit, along the axes of the turned box (3, B, n)."""

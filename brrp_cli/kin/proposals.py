@@ -10,14 +10,14 @@ from brrp_cli.config import KinConfig
 from brrp_cli.geometry import bell
 from brrp_cli.kin.evidence import Evidence
 from brrp_cli.kin.library import Library
-from brrp_cli.kin.placement import Placements, coarse_distance, joined
+from brrp_cli.kin.placement import KinPlacements, coarse_distance, joined
 
 Floats = NDArray[np.float32]
 
 CHUNK = 512
 
 
-def proposals(evidence: Evidence, library: Library, config: KinConfig) -> Placements:
+def proposals(evidence: Evidence, library: Library, config: KinConfig) -> KinPlacements:
     """All that are no larger, smaller or more stretched than is plausible, stance after stance."""
     seen, size = evidence.seen, library.half
     top = max(float(np.quantile(seen[:, 2], config.most[1])), 2 * config.least_half)
@@ -41,7 +41,7 @@ def proposals(evidence: Evidence, library: Library, config: KinConfig) -> Placem
             over = np.maximum(wide - shown, 0)
             middle = ((low + high) / 2 - near * over) @ axes
             found.append(
-                Placements(
+                KinPlacements(
                     stances,
                     np.full(len(size), turn, np.float32),
                     np.column_stack([middle, tall]).astype(np.float32),
@@ -60,7 +60,7 @@ def proposals(evidence: Evidence, library: Library, config: KinConfig) -> Placem
     return every[rows[np.argsort(every.stance[rows], kind="stable")]]
 
 
-def starts(evidence: Evidence, library: Library, config: KinConfig) -> Placements:
+def starts(evidence: Evidence, library: Library, config: KinConfig) -> KinPlacements:
     """The best proposals by the coarse fields, few of one shape."""
     every = proposals(evidence, library, config)
     score = np.concatenate(
@@ -85,7 +85,7 @@ def starts(evidence: Evidence, library: Library, config: KinConfig) -> Placement
 
 
 def _score(
-    placements: Placements, evidence: Evidence, library: Library, config: KinConfig
+    placements: KinPlacements, evidence: Evidence, library: Library, config: KinConfig
 ) -> Floats:
     seen, free = evidence.seen[: config.coarse_seen], evidence.free[: config.coarse_free]
     distance = coarse_distance(placements, np.concatenate([seen, free]), library)

@@ -9,16 +9,16 @@ from numpy.typing import NDArray
 from brrp_cli.config import KinConfig
 from brrp_cli.kin.evidence import Evidence
 from brrp_cli.kin.library import Library
-from brrp_cli.kin.placement import Placements, distance_and_slopes
-from brrp_cli.kin.unknowns import LEAST, UNKNOWNS, limited, size_prior
+from brrp_cli.kin.placement import KinPlacements, distance_and_slopes
+from brrp_cli.kin.unknowns import LEAST_WEIGHT, UNKNOWNS, limited, size_prior
 
 Floats = NDArray[np.float32]
 Array = NDArray[np.float64]
 
 
 def refined(
-    placements: Placements, evidence: Evidence, library: Library, config: KinConfig
-) -> Placements:
+    placements: KinPlacements, evidence: Evidence, library: Library, config: KinConfig
+) -> KinPlacements:
     """Each placement after `config.steps` steps over turn, middle, the three scales and taper."""
     seen, free = evidence.seen[: config.step_seen], evidence.free[: config.step_free]
     points = np.concatenate([seen, free])
@@ -42,13 +42,13 @@ def refined(
         H += prior_H
         g += prior_g
         diagonal = H[:, range(UNKNOWNS), range(UNKNOWNS)]
-        H[:, range(UNKNOWNS), range(UNKNOWNS)] = diagonal * (1 + config.damping) + LEAST
+        H[:, range(UNKNOWNS), range(UNKNOWNS)] = diagonal * (1 + config.damping) + LEAST_WEIGHT
         step = -np.asarray(np.linalg.solve(H, g[..., None])[..., 0], dtype=np.float64)
         placements = _moved(placements, step, config)
     return placements
 
 
-def _jacobian(placements: Placements, u: Floats, slope: Floats, across: Floats) -> Array:
+def _jacobian(placements: KinPlacements, u: Floats, slope: Floats, across: Floats) -> Array:
     """Rows (8, B, n): of the distance along each unknown."""
     c, s = np.cos(placements.turn)[:, None], np.sin(placements.turn)[:, None]
     half = placements.half.T[:, :, None]
@@ -77,10 +77,10 @@ def _weights(distance: Floats, seen: int, config: KinConfig) -> Array:
     return weight
 
 
-def _moved(placements: Placements, step: Array, config: KinConfig) -> Placements:
+def _moved(placements: KinPlacements, step: Array, config: KinConfig) -> KinPlacements:
     step = limited(step, config)
     taper = np.clip(placements.taper + step[:, 7], -config.most_taper, config.most_taper)
-    return Placements(
+    return KinPlacements(
         placements.stance,
         (placements.turn + step[:, 0]).astype(np.float32),
         (placements.middle + step[:, 1:4]).astype(np.float32),

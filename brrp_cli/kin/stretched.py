@@ -15,7 +15,7 @@ from brrp_cli.kin.bend import TERMS
 from brrp_cli.kin.bending import BentFit, BoxPoints, bent
 from brrp_cli.kin.evidence import Evidence
 from brrp_cli.kin.library import Library
-from brrp_cli.kin.placement import Placements
+from brrp_cli.kin.placement import KinPlacements
 from brrp_cli.kin.ways_out import seen_through
 from brrp_cli.prior.distance_field import quick_distance_field
 from brrp_cli.prior.parameters import FieldConfig
@@ -54,7 +54,7 @@ class BentShape:
 
 
 def unbent_shape(
-    placements: Placements, row: int, stored: StoredShape, library: Library
+    placements: KinPlacements, row: int, stored: StoredShape, library: Library
 ) -> BentShape:
     """Placement `row` as it is; stored : the shape of the object that it is of."""
     stance = placements.stance[row]

@@ -13,7 +13,7 @@ Reals = NDArray[np.floating]
 
 UNKNOWNS = 8
 # What no point sees, such as the turn of what is round, stays: far below any point's weight.
-LEAST = 1e-3
+LEAST_WEIGHT = 1e-3
 
 
 def size_prior(

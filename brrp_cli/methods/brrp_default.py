@@ -18,14 +18,14 @@ from brrp_cli.methods.earlier_views import (
     ALONE,
     EarlierViews,
     Guess,
-    Placed,
+    PlacedEarlier,
     Remembered,
     thinned,
 )
 from brrp_cli.methods.infer_object import Shown, infer_object, placed_shape, shown_of
 from brrp_cli.methods.kin_hypotheses import KinHypothesis, beside_round, kin_hypotheses
 from brrp_cli.methods.placements import Placements, Placer
-from brrp_cli.methods.scene import Scene
+from brrp_cli.methods.scene import SeenScene
 from brrp_cli.observation.ray_samples import ObjectObservation
 from brrp_cli.observation.soft_samples import soft_samples
 from brrp_cli.reconstruction import OK, ObjectReconstruction, Similar
@@ -41,7 +41,7 @@ Array = NDArray[np.float64]
 
 
 def reconstruct_by_hypotheses(
-    scene: Scene,
+    scene: SeenScene,
     observation: ObjectObservation,
     probabilities: Array,
     *,
@@ -101,7 +101,7 @@ class _Thing:
     views : earlier ones of it where it is now; begun : its placements in the last, by name
     """
 
-    scene: Scene
+    scene: SeenScene
     observation: ObjectObservation
     config: HypothesesConfig
     mask: SeenMask | None
@@ -129,7 +129,7 @@ class _Thing:
 
 
 def _looked_at(
-    scene: Scene,
+    scene: SeenScene,
     observation: ObjectObservation,
     earlier: EarlierViews | None,
     trial: TrialConfig | None,
@@ -221,7 +221,8 @@ def _memory(
         wave=scene.image.wave,
         probabilities=probabilities,
         placed=tuple(
-            Placed.of(each, float(w)) for each, w in zip(found.placed, found.weights, strict=False)
+            PlacedEarlier.of(each, float(w))
+            for each, w in zip(found.placed, found.weights, strict=False)
         ),
         ratios=found.ratios(),
         guess=guess,
@@ -230,7 +231,7 @@ def _memory(
     )
 
 
-def _hypotheses(scene: Scene, trial: TrialConfig | None) -> HypothesesConfig:
+def _hypotheses(scene: SeenScene, trial: TrialConfig | None) -> HypothesesConfig:
     """The configuration, as the frame's waves ask for; of a trial, one that gives up sooner."""
     assert scene.config.hypotheses is not None
     hypotheses = counted_once(scene.config.hypotheses, scene.aligns)
@@ -248,7 +249,7 @@ def _hypotheses(scene: Scene, trial: TrialConfig | None) -> HypothesesConfig:
 
 
 def _chosen(
-    scene: Scene,
+    scene: SeenScene,
     probabilities: Array,
     begun: dict[str, list[Hypothesis]],
     trial: TrialConfig | None,

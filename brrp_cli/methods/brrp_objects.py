@@ -13,7 +13,7 @@ from brrp_cli.methods.base import Setup, Stream
 from brrp_cli.methods.brrp_default import reconstruct_by_hypotheses
 from brrp_cli.methods.each_object import checked, guarded
 from brrp_cli.methods.earlier_views import EarlierViews
-from brrp_cli.methods.scene import Scene
+from brrp_cli.methods.scene import SeenScene
 from brrp_cli.methods.shared_work import each_shared, shared_work
 from brrp_cli.observation.ray_samples import SampledScene
 from brrp_cli.reconstruction import ObjectReconstruction
@@ -25,14 +25,14 @@ from brrp_cli.threads import cores
 class _Objects:
     """sampled : the scene; stream : of which its frame is one"""
 
-    scene: Scene
+    scene: SeenScene
     sampled: SampledScene
     stream: Stream | None
 
 
 @contextmanager
 def by_hypotheses(
-    scene: Scene, sampled: SampledScene, retriever: Retriever, setup: Setup
+    scene: SeenScene, sampled: SampledScene, retriever: Retriever, setup: Setup
 ) -> Iterator[Callable[[int], ObjectReconstruction]]:
     """Reconstructs the object of an id that has enough points; what goes wrong with one is told of
     it alone. Errors: PriorError."""

@@ -14,7 +14,7 @@ from brrp_cli.frames.frame import Frame
 from brrp_cli.methods.base import Setup, Trial
 from brrp_cli.methods.brrp_default import reconstruct_by_hypotheses
 from brrp_cli.methods.each_object import guarded, too_few
-from brrp_cli.methods.scene import Scene, look_at
+from brrp_cli.methods.scene import SeenScene, look_at
 from brrp_cli.methods.shared_work import shared_work
 from brrp_cli.observation.ray_samples import without_samples
 from brrp_cli.observation.strays import without_strays
@@ -29,7 +29,7 @@ class _Tries:
     """scene : of the frame as it is; tried_id : of what is tried, which no object has; retriever :
     for whoever tries a mask, None where it cannot be sent"""
 
-    scene: Scene
+    scene: SeenScene
     trial: Trial
     tried_id: int
     retriever: Retriever | None

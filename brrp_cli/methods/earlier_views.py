@@ -37,7 +37,7 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Placed:
+class PlacedEarlier:
     """A stored object as it was placed: T_cam_model (4, 4), scale, alignment score and weight, as
     of `Hypothesis` and the posterior."""
 
@@ -48,7 +48,7 @@ class Placed:
     weight: float
 
     @classmethod
-    def of(cls, hypothesis: Hypothesis, weight: float) -> Placed:
+    def of(cls, hypothesis: Hypothesis, weight: float) -> PlacedEarlier:
         """What a later frame needs of a placement."""
         return cls(
             hypothesis.model.stored.name,
@@ -98,7 +98,7 @@ class Remembered:
     samples: SoftSamples
     wave: float
     probabilities: Array
-    placed: tuple[Placed, ...]
+    placed: tuple[PlacedEarlier, ...]
     ratios: dict[str, float]
     guess: Guess | None
     surface: SeenSurface
@@ -112,7 +112,7 @@ def thinned(samples: SoftSamples, most: int, rng: np.random.Generator) -> SoftSa
 
 
 @dataclass(frozen=True)
-class View:
+class MovedView:
     """T_now_then, T_then_now : (4, 4) rigid, between that frame's camera and the present one's"""
 
     T_now_then: Array
@@ -124,7 +124,7 @@ class View:
 class EarlierViews:
     """Earlier views of one object, oldest first, maybe none, for the present frame."""
 
-    views: tuple[View, ...]
+    views: tuple[MovedView, ...]
     config: SharpenConfig
 
     @classmethod
@@ -132,7 +132,7 @@ class EarlierViews:
         """What the stream says of one object."""
         return cls(
             tuple(
-                View(
+                MovedView(
                     v.T_now_then,
                     inverse(v.T_now_then),
                     cast(Remembered, v.memory),

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from brrp_cli.completion.completed_mean import (
     empty_space,
+    logits_within,
     network_grid,
     shell_of,
-    within,
 )
 from brrp_cli.completion.revolution import round_logits
 from brrp_cli.completion.revolution_axis import Axis
@@ -188,6 +188,6 @@ def _completed(
         thought = np.clip(every[~empty], -config.limit, config.limit)
         heights = plane.signed_distance(left)
         every[~empty] = standing(thought, heights, spacing, config.standing)
-    logits = within(every, empty, joined(bounds), config)
+    logits = logits_within(every, empty, joined(bounds), config)
     guess = Guess(lower, spacing, np.where(empty, np.nan, alone).astype(np.float16))
     return MeanGrid(lower, spacing, logits, outside=-config.limit), guess

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from brrp_cli.config import HypothesesConfig
 from brrp_cli.methods.earlier_views import EarlierViews
-from brrp_cli.methods.scene import Scene
+from brrp_cli.methods.scene import SeenScene
 from brrp_cli.observation.ray_samples import ObjectObservation
 from brrp_cli.reconstruction import Retrieved
 from brrp_cli.registration.likelihood import SeenPixels, evidence, log_likelihood, see
@@ -89,7 +89,7 @@ class Placer:
 
     def __init__(
         self,
-        scene: Scene,
+        scene: SeenScene,
         observation: ObjectObservation,
         verifier: Verifier,
         config: HypothesesConfig,

@@ -47,7 +47,7 @@ class Image:
 
 
 @dataclass(frozen=True)
-class Scene:
+class SeenScene:
     """measured : the frame without strays; frame : the same with low things as high as they are;
     clear : the same without what is mixed at outlines, of which completion makes shapes (stored
     ones are held against the outline, too); image : its own, or that of the same frame with other
@@ -65,7 +65,7 @@ class Scene:
     given: frozenset[int] | None
 
 
-def look_at(frame: Frame, setup: Setup, retriever: Retriever, shapes: bool = True) -> Scene:
+def look_at(frame: Frame, setup: Setup, retriever: Retriever, shapes: bool = True) -> SeenScene:
     """The scene of a frame. shapes : whether shapes are to be made of what it shows"""
     config, prior = setup.config, setup.prior
     assert isinstance(config, Config) and config.hypotheses is not None and prior is not None
@@ -74,7 +74,7 @@ def look_at(frame: Frame, setup: Setup, retriever: Retriever, shapes: bool = Tru
         image = image_of(measured, hypotheses, config.observation, setup.seed)
     assert isinstance(image, Image)
     frame = image.mended(measured, hypotheses)
-    return Scene(
+    return SeenScene(
         measured,
         frame,
         image.clear(frame, hypotheses) if shapes else frame,

@@ -11,7 +11,7 @@ from typing import Any, TypeVar
 from brrp_cli.errors import PriorError
 from brrp_cli.executors.helpers import Helpers, LostError, shared
 from brrp_cli.methods.base import Method
-from brrp_cli.methods.scene import Scene
+from brrp_cli.methods.scene import SeenScene
 from brrp_cli.prior.by_name import from_bytes, to_bytes
 from brrp_cli.retrieval.base import Each
 from brrp_cli.threads import cores, in_threads
@@ -37,7 +37,7 @@ def started_later(method: Method, workers: int | None, count: int | None) -> Hel
 
 @contextmanager
 def shared_work(
-    do: Callable[..., R], common: Any, scene: Scene, helpers: Helpers | None
+    do: Callable[..., R], common: Any, scene: SeenScene, helpers: Helpers | None
 ) -> Iterator[Callable[..., R]]:
     """`do(common, *args)` as a function of args, which threads may call at the same time. Helpers
     import `do` by its name.
@@ -70,7 +70,7 @@ def shared_work(
         yield call
 
 
-def each_shared(scene: Scene, helpers: Helpers | None, workers: int) -> Each:
+def each_shared(scene: SeenScene, helpers: Helpers | None, workers: int) -> Each:
     """`Each` of retrievers, over `workers` threads and the helpers."""
 
     def each(do: Callable[..., R], common: Any, args: Sequence[tuple[Any, ...]], /) -> list[R]:
@@ -80,12 +80,12 @@ def each_shared(scene: Scene, helpers: Helpers | None, workers: int) -> Each:
     return each
 
 
-def _known(scene: Scene) -> tuple[object, ...]:
+def _known(scene: SeenScene) -> tuple[object, ...]:
     """What results may hold of a scene, and are not to bring back."""
     return scene.frame, scene.image.plane, scene.image.noise
 
 
-_last: tuple[str, Any, Scene] | None = None
+_last: tuple[str, Any, SeenScene] | None = None
 
 
 def _there(do: Callable[..., Any], path: str, args: tuple[Any, ...]) -> bytes:

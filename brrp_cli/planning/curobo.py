@@ -8,12 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brrp_cli.planning.body import Body
-from brrp_cli.planning.mjcf import FURNITURE_COLOUR, Table
+from brrp_cli.planning.mjcf import FURNITURE_COLOUR, TableBox
 from brrp_cli.planning.numbers import quaternion_wxyz
 from brrp_cli.planning.union import union_of_hulls
 
 
-def curobo_world(bodies: Mapping[str, Body], table: Table | None, frame: str) -> str:
+def curobo_world(bodies: Mapping[str, Body], table: TableBox | None, frame: str) -> str:
     """YAML for `curobo.geom.types.WorldConfig.from_dict`: a mesh for each body and each bin, a
     cuboid as table.
 

@@ -33,7 +33,7 @@ _BEGIN = (
 
 
 @dataclass(frozen=True)
-class Solid:
+class NamedMesh:
     """A closed mesh: vertices (n, 3), faces (m, 3). name : for messages"""
 
     name: str
@@ -42,7 +42,7 @@ class Solid:
 
 
 def parts_of(
-    solids: Sequence[Solid], how: str, seed: int, config: PartsConfig
+    solids: Sequence[NamedMesh], how: str, seed: int, config: PartsConfig
 ) -> Iterator[list[Array]]:
     """The convex parts of each solid, in their order, as `convex_parts` makes them.
 
@@ -82,7 +82,7 @@ class _Running:
     killed: bool = False
     lock: Lock = field(default_factory=Lock)
 
-    def decompose(self, solid: Solid, seed: int, config: PartsConfig) -> list[Array]:
+    def decompose(self, solid: NamedMesh, seed: int, config: PartsConfig) -> list[Array]:
         task = pickle.dumps((solid.vertices, solid.faces, COACD, seed, config))
         with self.lock:
             if self.killed:

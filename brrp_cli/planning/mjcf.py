@@ -21,7 +21,7 @@ TABLE_COLOUR = (0.7, 0.66, 0.6, 1.0)  # RGBA
 
 
 @dataclass(frozen=True)
-class Table:
+class TableBox:
     """A box whose top is the support plane, what stands on it, and what shuts it off.
 
     T_frame_table : (4, 4) of the box's centre, z its normal; size : (3,) metres, edge to edge
@@ -69,7 +69,7 @@ def body_mjcf(body: Body, files: Files, config: RestConfig) -> str:
 def scene_mjcf(
     bodies: Mapping[str, Body],
     files: Mapping[str, Files],
-    table: Table | None,
+    table: TableBox | None,
     config: RestConfig,
     poses: Mapping[str, NDArray[np.float64]] | None = None,
 ) -> str:

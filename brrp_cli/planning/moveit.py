@@ -31,7 +31,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brrp_cli.planning.body import Body
-from brrp_cli.planning.mjcf import FURNITURE_COLOUR, TABLE_COLOUR, Table
+from brrp_cli.planning.mjcf import FURNITURE_COLOUR, TABLE_COLOUR, TableBox
 from brrp_cli.planning.numbers import quaternion_wxyz, spell
 
 if TYPE_CHECKING:
@@ -45,7 +45,7 @@ BOX = 1
 Subframes = Mapping[str, Sequence[tuple[str, Array]]]
 
 
-def scene_text(bodies: Mapping[str, Body], table: Table | None, subframes: Subframes) -> str:
+def scene_text(bodies: Mapping[str, Body], table: TableBox | None, subframes: Subframes) -> str:
     """A `.scene` file, metres, frame of the results: each body, bin and wall as its convex
     parts, the table as a box.
 
@@ -79,7 +79,7 @@ def _part_lines(name: str, T: Array, colour: Iterable[float], parts: Sequence[Ar
 
 
 def planning_scene(
-    bodies: Mapping[str, Body], table: Table | None, subframes: Subframes, frame_id: str
+    bodies: Mapping[str, Body], table: TableBox | None, subframes: Subframes, frame_id: str
 ) -> dict[str, Any]:
     """moveit_msgs/PlanningScene, a diff, of the same, with poses in `frame_id`."""
     objects: list[dict[str, Any]] = []
@@ -133,7 +133,7 @@ def _object(name: str, T: Array, frame_id: str) -> dict[str, Any]:
     return {"header": {"frame_id": frame_id}, "id": name, "pose": pose(T)}
 
 
-def _furniture(table: Table | None) -> Iterable[tuple[str, Sequence[Array]]]:
+def _furniture(table: TableBox | None) -> Iterable[tuple[str, Sequence[Array]]]:
     return () if table is None else table.furniture.items()
 
 

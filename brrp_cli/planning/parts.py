@@ -56,7 +56,7 @@ def hull_corners(points: Array) -> Array:
 
 def cover(parts: list[Array], points: Array) -> list[Array]:
     """The parts, each grown to the points (n, 3) that lie in no part and are nearest to it."""
-    outside = np.stack([outside_hull(part, points) for part in parts])
+    outside = np.stack([beyond_hull(part, points) for part in parts])
     nearest = outside.argmin(axis=0)
     stray = outside.min(axis=0) > 0
     return [
@@ -65,7 +65,7 @@ def cover(parts: list[Array], points: Array) -> list[Array]:
     ]
 
 
-def outside_hull(part: Array, points: Array) -> Array:
+def beyond_hull(part: Array, points: Array) -> Array:
     """How far (n,), metres, points (n, 3) lie beyond the worst face of the hull of `part` (k, 3);
     negative inside."""
     from scipy.spatial import ConvexHull

@@ -29,7 +29,7 @@ from brrp_cli.dependencies import import_library
 from brrp_cli.errors import DependencyError, ResultError
 from brrp_cli.geometry import rotation_angle, transform_points
 from brrp_cli.planning.body import Body, lift_onto
-from brrp_cli.planning.mjcf import Files, Table, scene_mjcf
+from brrp_cli.planning.mjcf import Files, TableBox, scene_mjcf
 from brrp_cli.planning.parts import hull_corners
 
 Array = NDArray[np.float64]
@@ -65,7 +65,7 @@ def check_simulator() -> None:
         raise DependencyError(error.what, found=error.found, fix=fix) from error
 
 
-def put_to_rest(bodies: Mapping[str, Body], table: Table, config: RestConfig) -> dict[str, Rest]:
+def put_to_rest(bodies: Mapping[str, Body], table: TableBox, config: RestConfig) -> dict[str, Rest]:
     """Where each body rests on the table, by name. The same bodies give the same places. Errors:
     DependencyError without MuJoCo; ResultError where it does not take a shape."""
     levels = dict.fromkeys(bodies, 0)
@@ -141,7 +141,7 @@ class _World:
     """The scene as MuJoCo has it, from the file that simulators get."""
 
     def __init__(
-        self, bodies: Mapping[str, Body], poses: Poses, table: Table, config: RestConfig
+        self, bodies: Mapping[str, Body], poses: Poses, table: TableBox, config: RestConfig
     ) -> None:
         self.mj: Any = import_library("mujoco")
         self.config, self.names = config, list(bodies)
@@ -235,7 +235,7 @@ class _World:
         return [dof + i for dof in first for i in range(3)]
 
 
-def _lifted(bodies: Mapping[str, Body], table: Table) -> Poses:
+def _lifted(bodies: Mapping[str, Body], table: TableBox) -> Poses:
     """Where they were measured, and no part below the table's top."""
     found = {}
     for name, body in bodies.items():

@@ -17,8 +17,8 @@ from brrp_cli.geometry import IMAGE_UP, similarity, transform_points
 from brrp_cli.observation.strays import without_strays
 from brrp_cli.observation.support_plane import Plane
 from brrp_cli.planning.body import Body, body_axes, body_pose, mass_and_inertia
-from brrp_cli.planning.decompose import Solid, parts_of
-from brrp_cli.planning.mjcf import Table
+from brrp_cli.planning.decompose import NamedMesh, parts_of
+from brrp_cli.planning.mjcf import TableBox
 from brrp_cli.planning.options import PlanOptions
 from brrp_cli.reconstruction import Surface
 from brrp_cli.results.read import StoredResult
@@ -46,7 +46,7 @@ def planned_objects(stored: StoredResult, options: PlanOptions) -> Iterator[Plan
     """
     shapes = [_shape(stored, i, surface, options) for i, surface in stored.surfaces.items()]
     solids = [
-        Solid(
+        NamedMesh(
             str(stored.folder / f"object {shape.object_id}"),
             np.asarray(shape.collision.vertices, dtype=np.float64),
             np.asarray(shape.collision.faces, dtype=np.int64),
@@ -110,7 +110,7 @@ def table_under(
     plane: Plane | None,
     config: TableBoxConfig,
     around: Furniture | None = None,
-) -> Table | None:
+) -> TableBox | None:
     """A table whose top is the plane, or lies below it where that is a platform's, under all
     bodies, bins and platforms; None without a plane.
 
@@ -137,7 +137,7 @@ def table_under(
     platforms = {
         f"platform_{number}": [solid] for number, solid in enumerate(around.platforms, start=1)
     }
-    return Table(similarity(1.0, axes, axes @ middle), size, bins, walls, platforms)
+    return TableBox(similarity(1.0, axes, axes @ middle), size, bins, walls, platforms)
 
 
 def furniture_around(stored: StoredResult) -> Furniture:

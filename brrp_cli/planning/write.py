@@ -19,7 +19,7 @@ from brrp_cli.planning.curobo import curobo_world
 from brrp_cli.planning.mjcf import (
     FURNITURE_COLOUR,
     Files,
-    Table,
+    TableBox,
     body_mjcf,
     scene_mjcf,
     solid_name,
@@ -117,7 +117,7 @@ def _write_moveit(
     stored: StoredResult,
     folder: Path,
     bodies: dict[str, Body],
-    table: Table | None,
+    table: TableBox | None,
     frame_id: str,
 ) -> None:
     """Its text file and its message, and the grasps of the results where there are any. Errors:
@@ -140,7 +140,7 @@ def _save(mesh: trimesh.Trimesh, path: Path) -> None:
     path.write_text(trimesh.exchange.obj.export_obj(bare, include_normals=False, header=None))
 
 
-def _glb(bodies: dict[str, Body], table: Table | None) -> trimesh.Scene:
+def _glb(bodies: dict[str, Body], table: TableBox | None) -> trimesh.Scene:
     """All convex parts, each in a colour, and the table, in the frame of the results."""
     import trimesh
 
@@ -169,7 +169,7 @@ def _record(
     options: PlanOptions,
     objects: list[PlannedObject],
     files: dict[str, Files],
-    table: Table | None,
+    table: TableBox | None,
     resting: dict[str, Rest],
     config: RestConfig,
 ) -> dict[str, Any]:

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from brrp_cli.geometry import normalise, transform_points
 from brrp_cli.prior.objects import PriorObject
 from brrp_cli.reconstruction import Surface
-from brrp_cli.rendering.render import View, fitted, render
+from brrp_cli.rendering.render import PinholeView, fitted, render
 
 # Where the camera stands, seen from the object: a little above it, in front of a corner.
 DIRECTION = np.array([1.0, -1.6, 0.9])
@@ -32,7 +32,7 @@ def portrait(item: PriorObject) -> NDArray[np.uint8]:
         "",
     )
     eye = (low + high) / 2 + DISTANCE * diagonal * normalise(DIRECTION)
-    view = View(
+    view = PinholeView(
         np.array([[SIZE, 0, SIZE / 2], [0, SIZE, SIZE / 2], [0, 0, 1.0]]),
         _looking(eye, (low + high) / 2),
         (SIZE, SIZE),

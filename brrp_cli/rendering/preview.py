@@ -12,7 +12,7 @@ from brrp_cli.frames.frame import Frame
 from brrp_cli.geometry import IMAGE_UP
 from brrp_cli.reconstruction import ObjectReconstruction
 from brrp_cli.rendering.framing import near_others, shown_whole
-from brrp_cli.rendering.render import View, fitted, render, view_from_behind
+from brrp_cli.rendering.render import PinholeView, fitted, render, view_from_behind
 from brrp_cli.segmentation.mask_picture import draw_masks, object_colours
 from brrp_cli.spoken import NOT_STORED
 from brrp_cli.surface.colours import (
@@ -80,11 +80,11 @@ def preview(
     return np.vstack([np.hstack(row) for row in rows])
 
 
-def _panel_view(frame: Frame) -> View:
+def _panel_view(frame: Frame) -> PinholeView:
     height, width = frame.shape
     factor = PANEL_WIDTH / width
     K = frame.K * np.array([[factor], [factor], [1.0]])
-    return View(K, np.eye(4), (round(height * factor), PANEL_WIDTH))
+    return PinholeView(K, np.eye(4), (round(height * factor), PANEL_WIDTH))
 
 
 def _middle(objects: Sequence[ObjectReconstruction]) -> NDArray[np.float64]:

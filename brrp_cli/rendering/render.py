@@ -17,7 +17,7 @@ AMBIENT = 0.35
 
 
 @dataclass(frozen=True)
-class View:
+class PinholeView:
     """A pinhole camera: K (3, 3) in pixels, T_view_cam (4, 4), size (H, W) in pixels."""
 
     K: NDArray[np.float64]
@@ -25,17 +25,19 @@ class View:
     shape: tuple[int, int]
 
 
-def view_from_behind(view: View, target: NDArray[np.floating], up: NDArray[np.floating]) -> View:
+def view_from_behind(
+    view: PinholeView, target: NDArray[np.floating], up: NDArray[np.floating]
+) -> PinholeView:
     """The view turned half way round `target` (3,) about `up` (3,), both in the camera frame."""
     axis = normalise(np.asarray(up, dtype=np.float64))
     half_turn = 2 * np.outer(axis, axis) - np.eye(3)
     T = np.eye(4)
     T[:3, :3] = half_turn
     T[:3, 3] = target - half_turn @ target
-    return View(view.K, view.T_view_cam @ T, view.shape)
+    return PinholeView(view.K, view.T_view_cam @ T, view.shape)
 
 
-def fitted(view: View, surfaces: list[Surface], margin: float = 0.05) -> View:
+def fitted(view: PinholeView, surfaces: list[Surface], margin: float = 0.05) -> PinholeView:
     """The view with its lens changed so that all surfaces fill the picture but for a margin."""
     if not surfaces:
         return view
@@ -48,11 +50,11 @@ def fitted(view: View, surfaces: list[Surface], margin: float = 0.05) -> View:
     K = view.K.copy()
     K[:2] *= zoom
     K[:2, 2] += size / 2 - zoom * (low + high) / 2
-    return View(K, view.T_view_cam, view.shape)
+    return PinholeView(K, view.T_view_cam, view.shape)
 
 
 def render(
-    surfaces: list[Surface], colours: list[NDArray[np.uint8]], view: View
+    surfaces: list[Surface], colours: list[NDArray[np.uint8]], view: PinholeView
 ) -> NDArray[np.uint8]:
     """(H, W, 3) picture of surfaces with a colour for each vertex (n, 4), lit from the camera."""
     o3d = import_open3d()

@@ -17,7 +17,7 @@ from brrp_cli.segmentation.agglomerate import borders_of
 from brrp_cli.segmentation.components import find_parts, split_at_strongest
 from brrp_cli.segmentation.concave_edges import depth_jumps, hollow_creases, surface_normals
 from brrp_cli.segmentation.learned_affinities import affinities_in
-from brrp_cli.segmentation.seen_surfaces import see_surfaces, smoothed
+from brrp_cli.segmentation.seen_surfaces import see_surfaces, smoothed_depth
 
 log = logging.getLogger(__name__)
 
@@ -36,7 +36,7 @@ def boundary_of(frame: Frame, seed: int, config: SegmentConfig) -> NDArray[np.fl
 
 
 def _without_a_table(frame: Frame, config: SegmentConfig) -> NDArray[np.float64]:
-    depth, edges = smoothed(frame, config), config.concave_edges
+    depth, edges = smoothed_depth(frame, config), config.concave_edges
     points = backproject(depth, frame.K)
     crease = hollow_creases(points, surface_normals(points, edges), edges)
     return np.maximum(crease, depth_jumps(depth, frame.K, edges))

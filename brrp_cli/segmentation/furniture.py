@@ -19,7 +19,7 @@ from brrp_cli.observation.outlined import Outlined
 from brrp_cli.observation.support_plane import Plane
 from brrp_cli.segmentation.bin_walls import Solid, bins_of
 from brrp_cli.segmentation.outlines import corners_of, plain
-from brrp_cli.segmentation.seen_surfaces import smoothed
+from brrp_cli.segmentation.seen_surfaces import smoothed_depth
 from brrp_cli.segmentation.seen_table import see_table
 from brrp_cli.segmentation.table_plane import Table
 
@@ -73,7 +73,7 @@ def furniture(frame: Frame, plane: Plane | None, seed: int, config: SegmentConfi
     What has a mask is an object, and none of it. A side of a bin of which no rim is seen, as where
     the image's border cuts it, has no wall.
     """
-    points = backproject(smoothed(frame, config), frame.K)
+    points = backproject(smoothed_depth(frame, config), frame.K)
     try:
         table = see_table(points, frame.K, seed, frame.source, config).table
     except FrameError as error:

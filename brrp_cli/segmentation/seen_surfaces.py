@@ -47,7 +47,7 @@ class SeenSurfaces:
 @kept_for_last_image
 def see_surfaces(frame: Frame, seed: int, config: SegmentConfig) -> SeenSurfaces:
     """What `frame` shows. Errors: FrameError if it has too little depth, or no table."""
-    depth = smoothed(frame, config)
+    depth = smoothed_depth(frame, config)
     points = backproject(depth, frame.K)
     valid = np.isfinite(depth)
     if valid.sum() < config.least_depth * valid.size:
@@ -76,7 +76,7 @@ def see_surfaces(frame: Frame, seed: int, config: SegmentConfig) -> SeenSurfaces
     )
 
 
-def smoothed(frame: Frame, config: SegmentConfig) -> NDArray[np.float64]:
+def smoothed_depth(frame: Frame, config: SegmentConfig) -> NDArray[np.float64]:
     """Depth (H, W), metres, without flying pixels and averaged over each surface; NaN = none."""
     raw = np.where(frame.valid, frame.points[..., 2], np.nan)
     flying = flying_pixels(raw, config.smooth_depth)

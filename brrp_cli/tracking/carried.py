@@ -19,7 +19,7 @@ from brrp_cli.frames.frame import BACKGROUND, Frame
 from brrp_cli.frames.projection import at_pixels, depth_behind
 from brrp_cli.geometry import inverse, transform_points
 from brrp_cli.tracking.followed import Followed
-from brrp_cli.tracking.motion import camera_motion, same_depth, stands
+from brrp_cli.tracking.motion import camera_motion, camera_stands, same_depth
 from brrp_cli.tracking.unchanged import changed_pixels, slides
 
 Mask = NDArray[np.bool_]
@@ -55,7 +55,7 @@ def with_carried(
         return frame, nowhere
     own = config.carry
     resting = [i for i in sorted(last.mended) if rests(last.frame, frame, T_now_last, i, own)]
-    if stands(T_now_last, config) and last.frame.shape == frame.shape:
+    if camera_stands(T_now_last, config) and last.frame.shape == frame.shape:
         others = set(last.frame.object_ids) - last.mended
         changed = changed_pixels(last.frame, frame, config)
         resting += [i for i in sorted(others) if _stays(last.frame, frame, i, changed, config)]

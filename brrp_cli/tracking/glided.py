@@ -16,7 +16,7 @@ from brrp_cli.frames.projection import pixel_numbers
 from brrp_cli.geometry import backproject, inverse, transform_points
 from brrp_cli.observation.support_plane import Plane
 from brrp_cli.tracking.carried import rests
-from brrp_cli.tracking.motion import camera_motion, noisier, same_side, stands
+from brrp_cli.tracking.motion import camera_motion, camera_stands, noisier, same_side
 from brrp_cli.tracking.unchanged import slides
 
 Mask = NDArray[np.bool_]
@@ -47,7 +47,7 @@ def glided(then: Frame, now: Frame, plane: Plane | None, config: TrackConfig) ->
     """
     own = config.glide
     T_now_then = camera_motion(then, now, config)
-    if own is None or T_now_then is None or stands(T_now_then, config):
+    if own is None or T_now_then is None or camera_stands(T_now_then, config):
         return None
     for object_id in then.object_ids:
         at_rest = rests(then, now, T_now_then, object_id, config.carry)

@@ -72,7 +72,7 @@ def seen_again(
     return float((there & (at_pixels(moved, frame.segmap, frame) == new)).mean())
 
 
-def shared(
+def seen_both_ways(
     then: Frame, now: Frame, T_now_then: NDArray[np.float64], object_id: int, near: float
 ) -> float:
     """Share of an object's points in either frame that the other one shows, the lower of both;

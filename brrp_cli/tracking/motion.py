@@ -19,7 +19,7 @@ def unmoved(before: Frame, frame: Frame, config: TrackConfig) -> frozenset[int]:
     """The ids of two frames of one stream whose object has not moved between them; none where the
     camera has, or may have."""
     T_now_last = camera_motion(before, frame, config)
-    if T_now_last is None or not stands(T_now_last, config):
+    if T_now_last is None or not camera_stands(T_now_last, config):
         return frozenset()
     common = set(before.object_ids) & set(frame.object_ids)
     return frozenset(i for i in common if _unmoved(before, frame, i, config))
@@ -119,7 +119,7 @@ def edge_motion(last: Frame, frame: Frame, config: TrackConfig) -> float:
     return float(np.median(changed[strong] / slope[strong]))
 
 
-def turned(points: NDArray[np.floating], T_now_then: NDArray[np.float64]) -> float:
+def side_turn(points: NDArray[np.floating], T_now_then: NDArray[np.float64]) -> float:
     """Radians between the directions in which a camera that has moved by T_now_then (4, 4) saw the
     middle of points (n, 3), camera frame, then and now."""
     middle = np.median(points, axis=0).astype(np.float64)
@@ -127,7 +127,7 @@ def turned(points: NDArray[np.floating], T_now_then: NDArray[np.float64]) -> flo
     return float(np.arccos(np.clip(now @ then, -1, 1)))
 
 
-def stands(T: NDArray[np.float64], config: TrackConfig) -> bool:
+def camera_stands(T: NDArray[np.float64], config: TrackConfig) -> bool:
     """Whether a camera that has moved by T (4, 4) stands, as poses go."""
     turned = np.linalg.norm(T[:3, :3] - np.eye(3))
     return bool(max(turned, np.linalg.norm(T[:3, 3])) <= config.still_camera)
@@ -174,7 +174,9 @@ def same_side(
     then = np.median(points, axis=0).astype(np.float64)
     now = transform_points(T_now_then, then)
     factor = float(np.linalg.norm(now) / np.linalg.norm(then))
-    return turned(now[None], T_now_then) <= config.side and 1 / config.near <= factor <= config.near
+    return (
+        side_turn(now[None], T_now_then) <= config.side and 1 / config.near <= factor <= config.near
+    )
 
 
 def noisier(depth: NDArray[np.floating]) -> NDArray[np.floating]:

@@ -12,7 +12,7 @@ from brrp_cli.frames.frame import Frame
 from brrp_cli.frames.projection import at_pixels, depth_behind
 from brrp_cli.geometry import transform_points
 from brrp_cli.reconstruction import MovablePosterior, ObjectReconstruction, Retrieved
-from brrp_cli.tracking.match import shared
+from brrp_cli.tracking.match import seen_both_ways
 from brrp_cli.tracking.motion import same_gap, same_side
 
 
@@ -24,7 +24,7 @@ def holds(
     points = then.object_points(object_id)
     if config.glide is None or not same_side(points, T_now_then, config.glide):
         return False
-    if shared(then, now, T_now_then, object_id, config.carry.gap) < config.glide.same:
+    if seen_both_ways(then, now, T_now_then, object_id, config.carry.gap) < config.glide.same:
         return False
     points = transform_points(T_now_then, points)
     gap = depth_behind(points, now)

@@ -24,7 +24,7 @@ from brrp_cli.tracking.carried import with_carried
 from brrp_cli.tracking.followed import Followed, first_frame, follow, not_tried, with_known
 from brrp_cli.tracking.glided import glided
 from brrp_cli.tracking.lost import Lost, lost_tracks
-from brrp_cli.tracking.motion import at_rest, camera_motion, spread_out, stands, unmoved
+from brrp_cli.tracking.motion import at_rest, camera_motion, camera_stands, spread_out, unmoved
 from brrp_cli.tracking.moved import holds, moved_object
 from brrp_cli.tracking.odometry import Odometry
 from brrp_cli.tracking.renamed import new_names, with_names
@@ -168,7 +168,7 @@ class Tracker:
         else:
             made = self._made[0][1]
             plane = made.plane
-            if plane is not None and not stands(T, self._config):
+            if plane is not None and not camera_stands(T, self._config):
                 plane = plane.moved(T)
             result = replace(made, frame=seen, objects=[], plane=plane, seconds={}, image=None)
         objects = sorted([*result.objects, *kept], key=lambda item: item.object_id)
@@ -201,7 +201,7 @@ class Tracker:
             T = camera_motion(before, seen, self._config)
             if T is None:
                 continue
-            if stands(T, self._config):
+            if camera_stands(T, self._config):
                 still = unmoved(before, seen, self._config)
                 same = [each for each in result.reconstructed if each.object_id in still]
             else:

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from brrp_cli.config.tracking import TrackConfig
 from brrp_cli.frames.frame import Frame
-from brrp_cli.tracking.match import shared
-from brrp_cli.tracking.motion import camera_motion, turned
+from brrp_cli.tracking.match import seen_both_ways
+from brrp_cli.tracking.motion import camera_motion, side_turn
 
 
 def tried_before(tried: Mapping[int, Frame], now: Frame, config: TrackConfig) -> set[int]:
@@ -35,6 +35,6 @@ def _same_view(
     then: Frame, now: Frame, T_now_then: NDArray[np.float64], object_id: int, config: TrackConfig
 ) -> bool:
     points = now.object_points(object_id)
-    if not len(points) or turned(points, T_now_then) > config.carry.side:
+    if not len(points) or side_turn(points, T_now_then) > config.carry.side:
         return False
-    return shared(then, now, T_now_then, object_id, config.carry.gap) >= config.carry.same
+    return seen_both_ways(then, now, T_now_then, object_id, config.carry.gap) >= config.carry.same

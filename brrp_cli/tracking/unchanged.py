@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from brrp_cli.config.tracking import TrackConfig
 from brrp_cli.frames.dilate import dilated, opened
 from brrp_cli.frames.frame import Frame
-from brrp_cli.tracking.motion import camera_motion, noisier, stands
+from brrp_cli.tracking.motion import camera_motion, camera_stands, noisier
 
 Mask = NDArray[np.bool_]
 
@@ -19,7 +19,7 @@ def unchanged(before: Frame, now: Frame, config: TrackConfig) -> bool:
     object shows that it slides. What creeps does not change between two frames: hold the newest one
     to the one that masks were made of."""
     T_now_before = camera_motion(before, now, config)
-    if T_now_before is None or not stands(T_now_before, config) or before.shape != now.shape:
+    if T_now_before is None or not camera_stands(T_now_before, config) or before.shape != now.shape:
         return False
     changed = changed_pixels(before, now, config)
     # Borders waver: what is thin is none of an object.

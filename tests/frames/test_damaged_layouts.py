@@ -13,7 +13,7 @@ from PIL import Image
 from test_formats import image, info, write_bop, write_images, write_tum
 
 from brrp_cli.errors import BrrpError, FrameError, SceneError
-from brrp_cli.frames.format import Request
+from brrp_cli.frames.format import FrameRequest
 from brrp_cli.frames.readers import read_frame
 from brrp_cli.frames.ros_images import frame_of
 from brrp_cli.ground_truth.scenes import find_scenes
@@ -122,7 +122,7 @@ def test_a_mask_whose_name_tells_no_number_is_told(layouts) -> None:
 def test_an_index_that_is_none_is_told(layouts, index: str) -> None:
     for folder in (*layouts.values(), layouts["bop"].parents[1]):
         with pytest.raises(FrameError, match=r"no such (frame|image)"):
-            read_frame(folder, request=Request(index=index))
+            read_frame(folder, request=FrameRequest(index=index))
 
 
 def test_a_compressed_image_of_a_billion_pixels_is_refused_unread(scene) -> None:

@@ -17,7 +17,7 @@ from PIL import Image
 from brrp_cli.cli import main
 from brrp_cli.errors import FrameError
 from brrp_cli.frames import formats
-from brrp_cli.frames.format import Request
+from brrp_cli.frames.format import FrameRequest
 from brrp_cli.frames.readers import known_formats, matching, read_frame
 from brrp_cli.frames.ros_images import colour_of, depth_of, frame_of
 
@@ -122,13 +122,13 @@ def test_a_bop_image_has_its_visible_masks_and_its_camera(scene, tmp_path, below
 
 def test_bop_images_go_by_their_number(scene, tmp_path):
     write_bop(tmp_path, scene)
-    dark = read_frame(tmp_path, request=Request(index="000048/12"))
+    dark = read_frame(tmp_path, request=FrameRequest(index="000048/12"))
     assert np.array_equal(dark.rgb, scene.rgb // 2)
     assert np.array_equal(
-        read_frame(tmp_path / "test/000048", request=Request(index="12")).rgb, dark.rgb
+        read_frame(tmp_path / "test/000048", request=FrameRequest(index="12")).rgb, dark.rgb
     )
     with pytest.raises(FrameError, match=r"no such image(.|\n)*3, 12"):
-        read_frame(tmp_path, request=Request(index="000048/0"))
+        read_frame(tmp_path, request=FrameRequest(index="000048/0"))
     with pytest.raises(FrameError, match="--depth-scale means nothing here"):
         read_frame(tmp_path, depth_scale=0.001)
 
@@ -184,7 +184,7 @@ def test_a_tum_sequence_has_5000_units_to_the_metre_and_poses(scene, tmp_path, c
 def test_tum_images_without_depth_near_them_are_left_out(scene, tmp_path):
     folder = write_tum(tmp_path / "freiburg1", scene)
     with pytest.raises(FrameError, match=r"no such frame(.|\n)*0 to 0"):
-        read_frame(folder, request=Request(index="1"))
+        read_frame(folder, request=FrameRequest(index="1"))
 
 
 def test_tum_intrinsics_are_never_guessed(scene, tmp_path):
@@ -193,7 +193,7 @@ def test_tum_intrinsics_are_never_guessed(scene, tmp_path):
         read_frame(folder)
     k = tmp_path / "k.json"
     k.write_text(json.dumps({"K": scene.K.tolist()}))
-    assert_the_scene(read_frame(folder, request=Request(intrinsics=k)), scene)
+    assert_the_scene(read_frame(folder, request=FrameRequest(intrinsics=k)), scene)
 
 
 @pytest.mark.parametrize(
@@ -209,7 +209,7 @@ def test_recordings_of_open3d_are_read(scene, tmp_path, caplog, intrinsics, digi
         json.dumps({"width": 160, "height": 120, "intrinsic_matrix": matrix})
     )
     with caplog.at_level(logging.INFO):
-        frame = read_frame(tmp_path, request=Request(index="1"))
+        frame = read_frame(tmp_path, request=FrameRequest(index="1"))
     assert_the_scene(frame, scene)
     assert "millimetres" in caplog.text
     assert [title in one.title for one in matching(tmp_path)] == [True]
@@ -219,7 +219,7 @@ def test_recordings_of_open3d_are_read(scene, tmp_path, caplog, intrinsics, digi
     )
     (tmp_path / "depth" / f"{1:0{digits}d}.png").unlink()
     with pytest.raises(FrameError, match="no such frame"):
-        read_frame(tmp_path, request=Request(index="1"))
+        read_frame(tmp_path, request=FrameRequest(index="1"))
 
 
 @pytest.mark.parametrize(

@@ -11,7 +11,7 @@ from PIL import Image
 from test_formats import assert_the_scene, write_bop, write_images
 
 from brrp_cli.errors import FrameError
-from brrp_cli.frames.format import Request
+from brrp_cli.frames.format import FrameRequest
 from brrp_cli.frames.frame import Frame
 from brrp_cli.frames.npz import save_frame
 from brrp_cli.frames.readers import list_frames, read_frame
@@ -57,10 +57,10 @@ def test_graspnets_layout_is_read_from_any_height(scene, tmp_path):
     assert frame.T_world_cam == pytest.approx(scene.T_world_cam, abs=1e-9)
     assert frame.object_ids == [1, 20, 88]
     assert np.array_equal(frame.segmap == 20, scene.segmap == 250)
-    darker = read_frame(root, request=Request(index="scene_0007/realsense/0001"))
+    darker = read_frame(root, request=FrameRequest(index="scene_0007/realsense/0001"))
     assert np.array_equal(darker.rgb, scene.rgb // 2)
     with pytest.raises(FrameError, match=r"no such frame(.|\n)*scene_0007"):
-        read_frame(root, request=Request(index="scene_0008/kinect/0000"))
+        read_frame(root, request=FrameRequest(index="scene_0008/kinect/0000"))
 
 
 def test_graspnets_example_of_one_frame_is_read_with_its_meta(scene, tmp_path):
@@ -115,13 +115,13 @@ def test_names_of_every_format_read_the_frames_that_they_are_of(scene, tmp_path)
     (tmp_path / "notes.txt").touch()
     every = ["bop/000048/3", "bop/000048/12", "one.npz", "recording/a", "recording/b"]
     assert list_frames(tmp_path) == every
-    by_name = [read_frame(tmp_path, request=Request(index=name)).rgb for name in every]
-    by_number = [read_frame(tmp_path, request=Request(index=str(i))).rgb for i in range(5)]
+    by_name = [read_frame(tmp_path, request=FrameRequest(index=name)).rgb for name in every]
+    by_number = [read_frame(tmp_path, request=FrameRequest(index=str(i))).rgb for i in range(5)]
     expected = [scene.rgb, scene.rgb // 2, scene.rgb // 3, scene.rgb, scene.rgb // 2]
     for named, counted, right in zip(by_name, by_number, expected, strict=True):
         assert np.array_equal(named, right) and np.array_equal(counted, right)
     with pytest.raises(FrameError, match="no such frame"):
-        read_frame(tmp_path, request=Request(index="5"))
+        read_frame(tmp_path, request=FrameRequest(index="5"))
 
 
 def test_an_array_that_lies_beside_frames_is_none_of_them(scene, tmp_path):

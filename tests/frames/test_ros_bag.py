@@ -10,7 +10,7 @@ from click.testing import CliRunner
 
 from brrp_cli.cli import main
 from brrp_cli.errors import FrameError
-from brrp_cli.frames.format import Request
+from brrp_cli.frames.format import FrameRequest
 from brrp_cli.frames.readers import list_frames, read_frame
 
 rosbags = pytest.importorskip("rosbags")
@@ -93,20 +93,20 @@ def test_a_bag_is_read_with_the_depth_that_is_aligned(scene, bag):
     seen = np.isfinite(scene.depth)
     assert np.array_equal(frame.valid, seen)
     assert frame.points[seen][:, 2] == pytest.approx(scene.depth[seen], abs=6e-4)
-    assert np.array_equal(read_frame(bag, request=Request(index="1")).rgb, scene.rgb // 2)
+    assert np.array_equal(read_frame(bag, request=FrameRequest(index="1")).rgb, scene.rgb // 2)
     with pytest.raises(FrameError, match="no such frame"):
-        read_frame(bag, request=Request(index="2"))
+        read_frame(bag, request=FrameRequest(index="2"))
 
 
 def test_depth_of_another_camera_is_refused(bag):
-    request = Request(depth_topic="/camera/depth/image_rect_raw")
+    request = FrameRequest(depth_topic="/camera/depth/image_rect_raw")
     with pytest.raises(FrameError, match=r"sizes disagree(.|\n)*80 x 60(.|\n)*align"):
         read_frame(bag, request=request)
 
 
 def test_topics_that_are_not_there_are_listed(bag):
     with pytest.raises(FrameError, match=r"color topic is not clear(.|\n)*/camera/color/image_raw"):
-        read_frame(bag, request=Request(color_topic="/left"))
+        read_frame(bag, request=FrameRequest(color_topic="/left"))
 
 
 def test_a_bag_without_depth_and_a_damaged_one_are_told(scene, tmp_path):
@@ -139,7 +139,7 @@ def test_a_damaged_bag_is_read_or_refused(scene, tmp_path, ros1):
             read_frame(path)
     for index in ("abc", "²", "-1", 5000 * "9"):
         with pytest.raises(FrameError):
-            read_frame(path, request=Request(index=index))
+            read_frame(path, request=FrameRequest(index=index))
 
 
 def test_a_bag_says_what_it_holds(bag):

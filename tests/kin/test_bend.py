@@ -11,7 +11,7 @@ from table_scene import TABLE, in_camera, photograph, placed
 from brrp_cli.config import preset
 from brrp_cli.geometry import transform_points
 from brrp_cli.kin import bend
-from brrp_cli.kin.bending import UNKNOWNS, BentFit, BoxPoints
+from brrp_cli.kin.bending import BENT_UNKNOWNS, BentFit, BoxPoints
 from brrp_cli.kin.evidence import gather
 from brrp_cli.kin.stretched import BentShape, bent_shape
 from brrp_cli.kin.ways_out import ways_out
@@ -81,11 +81,11 @@ def test_leaning_is_a_small_rotation():
         assert moved == pytest.approx(np.cross(axis, u * HALF))
 
 
-@pytest.mark.parametrize("unknown", range(UNKNOWNS))
+@pytest.mark.parametrize("unknown", range(BENT_UNKNOWNS))
 def test_points_go_along_each_unknown_as_the_difference_quotient_says(unknown):
     fit = some_fit(taper=0.0)
     u, way = RNG.uniform(-0.9, 0.9, (30, 3)), RNG.normal(size=(30, 3))
-    step = np.zeros(UNKNOWNS)
+    step = np.zeros(BENT_UNKNOWNS)
     step[unknown] = 1e-5
     loose = replace(KIN, bend_steepest=0.99)
     ends = [fit.stepped(sign * step, loose).placed(BoxPoints(u)) for sign in (1, -1)]

@@ -15,7 +15,7 @@ from brrp_cli.geometry import transform_points
 from brrp_cli.kin.evidence import gather
 from brrp_cli.kin.fit import fit_kin
 from brrp_cli.kin.kept_library import kin_library
-from brrp_cli.kin.placement import Placements, coarse_distance, distance_and_slopes
+from brrp_cli.kin.placement import KinPlacements, coarse_distance, distance_and_slopes
 from brrp_cli.kin.refine import refined
 from brrp_cli.kin.stretched import unbent_shape
 from brrp_cli.methods.kin_hypotheses import kin_shares
@@ -133,7 +133,7 @@ def test_distances_and_slopes_are_those_of_the_stretched_mesh(prior, taper):
     library = kin_library(prior, KIN)
     stance = next(i for i, o in enumerate(library.object) if library.names[o] == "can")
     half = library.half[stance] * [1.2, 0.9, 1.1]
-    at = Placements(
+    at = KinPlacements(
         np.array([stance]),
         np.array([0.4], np.float32),
         np.array([[0.02, -0.01, half[2]]], np.float32),
@@ -163,7 +163,7 @@ def test_coarse_distances_are_right_to_half_a_node_and_grow_off_the_grid(prior, 
     stances = np.arange(len(library.object))
     rng = np.random.default_rng(0)
     half = (library.half * rng.uniform(0.8, 1.25, (len(stances), 3))).astype(np.float32)
-    at = Placements(
+    at = KinPlacements(
         stances,
         rng.uniform(0, 2 * np.pi, len(stances)).astype(np.float32),
         rng.normal(0, 0.02, (len(stances), 3)).astype(np.float32),
@@ -202,7 +202,7 @@ def test_a_step_that_no_point_says_anything_about_is_none(prior):
     evidence = gather(points, frame, ID, TABLE, KIN, sensor, np.random.default_rng(0))
     library = kin_library(prior, KIN)
     half = library.half[:1]
-    far = Placements(
+    far = KinPlacements(
         np.array([0]),
         np.array([0.3], np.float32),
         np.array([[1e4, -1e4, half[0, 2]]], np.float32),

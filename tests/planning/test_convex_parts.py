@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from brrp_cli.config.planning import PartsConfig
-from brrp_cli.planning.parts import COACD, HULL, convex_parts, cover, hull_corners, outside_hull
+from brrp_cli.planning.parts import COACD, HULL, beyond_hull, convex_parts, cover, hull_corners
 from brrp_cli.planning.union import union_of_hulls
 from brrp_cli.shapes import solids
 
@@ -27,7 +27,7 @@ def test_a_hull_is_one_part_with_the_corners_alone():
     mesh = solids.box(0.1, 0.06, 0.04).subdivide()
     (part,) = of(mesh, HULL)
     assert len(part) == 8
-    assert outside_hull(part, np.asarray(mesh.vertices)).max() < 1e-12
+    assert beyond_hull(part, np.asarray(mesh.vertices)).max() < 1e-12
 
 
 def test_coacd_keeps_the_channel_open():
@@ -35,8 +35,8 @@ def test_coacd_keeps_the_channel_open():
     mesh = channel()
     parts = of(mesh, COACD)
     assert 3 <= len(parts) <= 5
-    assert np.min([outside_hull(p, np.asarray(mesh.vertices)) for p in parts], 0).max() < 1e-9
-    assert min(outside_hull(p, np.array([[0, 0, 0.06]]))[0] for p in parts) > 0.02
+    assert np.min([beyond_hull(p, np.asarray(mesh.vertices)) for p in parts], 0).max() < 1e-9
+    assert min(beyond_hull(p, np.array([[0, 0, 0.06]]))[0] for p in parts) > 0.02
     again = of(mesh, COACD)
     assert all(np.array_equal(a, b) for a, b in zip(parts, again, strict=True))
 
@@ -48,9 +48,9 @@ def test_cover_leaves_no_point_outside_and_loses_none(seed):
     parts = [hull_corners(rng.normal(c, 0.5, (12, 3))) for c in (-1.0, 1.0)]
     points = rng.normal(0, 2, (50, 3))
     covered = cover(parts, points)
-    assert np.min([outside_hull(p, points) for p in covered], axis=0).max() < 1e-9
+    assert np.min([beyond_hull(p, points) for p in covered], axis=0).max() < 1e-9
     for before, after in zip(parts, covered, strict=True):
-        assert outside_hull(after, before).max() < 1e-9
+        assert beyond_hull(after, before).max() < 1e-9
 
 
 def test_the_union_is_one_closed_surface_of_known_volume():

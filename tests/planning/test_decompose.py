@@ -10,15 +10,15 @@ import pytest
 from brrp_cli.config.planning import PartsConfig
 from brrp_cli.errors import ResultError
 from brrp_cli.planning import decompose
-from brrp_cli.planning.decompose import Solid, parts_of
+from brrp_cli.planning.decompose import NamedMesh, parts_of
 from brrp_cli.planning.parts import COACD, HULL, convex_parts
 from brrp_cli.shapes import solids
 
 CONFIG = PartsConfig()
 
 
-def solid(mesh, name="one") -> Solid:
-    return Solid(name, np.asarray(mesh.vertices), np.asarray(mesh.faces))
+def solid(mesh, name="one") -> NamedMesh:
+    return NamedMesh(name, np.asarray(mesh.vertices), np.asarray(mesh.faces))
 
 
 @pytest.fixture

@@ -16,7 +16,7 @@ from table_scene import NORMAL, T_CAM_WORLD, T_WORLD_CAM, TABLE
 from brrp_cli.api import open_result
 from brrp_cli.cli import main
 from brrp_cli.geometry import transform_points
-from brrp_cli.planning.parts import outside_hull
+from brrp_cli.planning.parts import beyond_hull
 
 DENSITY = 400.0
 
@@ -115,23 +115,23 @@ def test_mass_and_inertia_are_those_of_the_solid_at_the_density(plan):
 def test_parts_hold_the_mesh_and_keep_what_is_hollow(plan):
     for object_id in (BOX, ELL):
         mesh = trimesh.load_mesh(plan[0].parent / f"object_{object_id}.ply", process=False)
-        outside = np.min([outside_hull(p, mesh.vertices) for p in parts(plan[0], object_id)], 0)
+        outside = np.min([beyond_hull(p, mesh.vertices) for p in parts(plan[0], object_id)], 0)
         assert outside.max() < 1e-5
     hollow = T_CAM_WORLD @ [*HOLLOW, 1]
-    assert min(outside_hull(p, hollow[None, :3])[0] for p in parts(plan[0], ELL)) > 0.01
+    assert min(beyond_hull(p, hollow[None, :3])[0] for p in parts(plan[0], ELL)) > 0.01
 
 
 def test_the_hull_fills_it(grown):
     hollow = T_CAM_WORLD @ [*HOLLOW, 1]
     (hull,) = parts(grown, ELL)
-    assert outside_hull(hull, hollow[None, :3])[0] < 0
+    assert beyond_hull(hull, hollow[None, :3])[0] < 0
 
 
 def test_a_margin_holds_the_true_surface_and_follows_the_uncertainty(tight):
     """The posterior's surface is logistic with scale 2 mm: at 0.95 it is grown by 2 ln 19 mm."""
     for object_id, true in truth().items():
         (hull,) = parts(tight / "plan", object_id)
-        assert outside_hull(hull, true.vertices).max() < 0
+        assert beyond_hull(hull, true.vertices).max() < 0
         item = of(tight / "plan", object_id)
         assert item["level"] == pytest.approx(0.05, rel=0.1)
         assert item["bounded"]
@@ -144,7 +144,7 @@ def test_what_is_guessed_is_held_with_room_where_nothing_was_seen(results, grown
     frame = open_result(results).frame
     for object_id, true in truth().items():
         (hull,) = parts(grown, object_id)
-        assert outside_hull(hull, true.vertices).max() < 0
+        assert beyond_hull(hull, true.vertices).max() < 0
         item = of(grown, object_id)
         assert item["level"] == pytest.approx(0.05, rel=0.1)
         assert item["bounded"]
@@ -249,7 +249,7 @@ def test_the_world_frame_is_that_of_the_results(tmp_path):
     np.testing.assert_allclose(np.array(item["T_frame_body"])[:3, 2], [0, 0, 1], atol=1e-6)
     true = transform_points(T_WORLD_CAM, truth()[BOX].vertices)
     (hull,) = parts(folder / "plan", BOX)
-    assert outside_hull(hull, true).max() < 0
+    assert beyond_hull(hull, true).max() < 0
     assert record(folder / "plan")["up"] == pytest.approx([0, 0, 1], abs=1e-6)
 
 

@@ -15,7 +15,7 @@ from table_scene import T_WORLD_CAM
 
 from brrp_cli.cli import main
 from brrp_cli.geometry import transform_points
-from brrp_cli.planning.parts import outside_hull
+from brrp_cli.planning.parts import beyond_hull
 
 NAMES = {"table", f"object_{BOX}", f"object_{ELL}"}
 
@@ -53,7 +53,7 @@ def test_the_text_holds_the_true_objects_the_table_and_the_grasps(folder):
         (hull,) = item.shapes
         assert hull.is_watertight and hull.volume > 0
         placed = transform_points(item.T, hull.vertices)
-        assert outside_hull(placed, transform_points(T_WORLD_CAM, mesh.vertices)).max() < 0
+        assert beyond_hull(placed, transform_points(T_WORLD_CAM, mesh.vertices)).max() < 0
         found = grasps(folder)[f"object_{object_id}"]
         assert list(item.subframes) == [f"grasp_{i}" for i in range(len(found))] and found
         for T, grasp in zip(item.subframes.values(), found, strict=True):

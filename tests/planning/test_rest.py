@@ -17,12 +17,12 @@ from brrp_cli.cli import main
 from brrp_cli.config.planning import RestConfig
 from brrp_cli.geometry import similarity, transform_points
 from brrp_cli.planning.body import Body, mass_and_inertia
-from brrp_cli.planning.mjcf import Table
+from brrp_cli.planning.mjcf import TableBox
 from brrp_cli.planning.parts import hull_corners
 from brrp_cli.planning.rest import Rest, put_to_rest
 
 pytest.importorskip("mujoco")
-TABLE = Table(similarity(translation=np.array([0, 0, -0.01])), np.array([2.0, 2.0, 0.02]))
+TABLE = TableBox(similarity(translation=np.array([0, 0, -0.01])), np.array([2.0, 2.0, 0.02]))
 
 
 def body(mesh: trimesh.Trimesh, *place: float, turned=(0.0, 0.0, 0.0), name: str = "a") -> Body:

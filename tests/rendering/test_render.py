@@ -3,11 +3,11 @@ import pytest
 import trimesh
 
 from brrp_cli.reconstruction import LOGIT_VARIANCE, METRES, Surface
-from brrp_cli.rendering.render import BACKGROUND, View, fitted, render, view_from_behind
+from brrp_cli.rendering.render import BACKGROUND, PinholeView, fitted, render, view_from_behind
 from brrp_cli.surface.colours import scale_top, spread, spread_colours, spread_label
 
 K = np.array([[200.0, 0, 100], [0, 200, 80], [0, 0, 1]])
-FRONT = View(K, np.eye(4), (160, 200))
+FRONT = PinholeView(K, np.eye(4), (160, 200))
 UP = np.array([0.0, -1.0, 0.0])
 
 

@@ -13,7 +13,7 @@ from tempfile import TemporaryDirectory
 import numpy as np
 import trimesh
 
-from brrp_cli.completion.completed_mean import network_grid, shell_of, within
+from brrp_cli.completion.completed_mean import logits_within, network_grid, shell_of
 from brrp_cli.completion.seen_surface import SeenSurface, seen_surface
 from brrp_cli.completion.visible_part import VisiblePart
 from brrp_cli.config import FeatureConfig, MeanConfig, preset
@@ -117,7 +117,7 @@ def completed_grid(
 ) -> np.ndarray:
     """Logits (nx, ny, nz) of the completion of one view at nodes (nx, ny, nz, 3)."""
     bounds = surface.bounds(nodes[~empty], shell_of(nodes, config), config)
-    return within(network_grid(nodes, empty, part, config), empty, bounds, config)
+    return logits_within(network_grid(nodes, empty, part, config), empty, bounds, config)
 
 
 def photograph(

@@ -29,7 +29,7 @@ from grasp_trial.trial import (
 
 from brrp_cli.grasping.gripper_file import open_gripper
 from brrp_cli.ground_truth.truth import TrueObject
-from brrp_cli.planning.parts import outside_hull
+from brrp_cli.planning.parts import beyond_hull
 from brrp_cli.shapes import solids
 
 FRANKA = open_gripper("franka-hand")
@@ -172,5 +172,5 @@ def test_a_finger_finds_the_neck_of_a_bottle(tmp_path):
     turn = np.linspace(0, 2 * np.pi, 24)
     for radius, is_inside in ((0.0265, False), (0.021, True)):
         ring = np.column_stack([radius * np.cos(turn), radius * np.sin(turn), 0 * turn + 0.055])
-        nearest = np.min([outside_hull(part, ring) for part in body.parts], axis=0)
+        nearest = np.min([beyond_hull(part, ring) for part in body.parts], axis=0)
         assert ((nearest < 1e-6) == is_inside).all()

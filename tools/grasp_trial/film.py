@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from brrp_cli.files import atomic_path
 from brrp_cli.geometry import normalise
 from brrp_cli.reconstruction import Surface
-from brrp_cli.rendering.render import View, render
+from brrp_cli.rendering.render import PinholeView, render
 from grasp_trial.trial import CLOSED, HELD, IN, LIFTED, PRE_GRASP, SHAKEN
 from grasp_trial.world import TABLE_NAME
 
@@ -133,7 +133,7 @@ class Take:
             return TARGET
         return OTHERS if body.startswith("object") else HAND
 
-    def _view(self, side: float, scale: float) -> View:
+    def _view(self, side: float, scale: float) -> PinholeView:
         """From a side and a little above, the same for all phases."""
         middle = np.array([*self.at[:2], LOOKS_AT])
         back = normalise(np.array([np.cos(side), np.sin(side), 0.35]))
@@ -144,7 +144,7 @@ class Take:
         T[:3, 3] = -axes @ (middle + AWAY * back)
         K = np.array([[FOCAL, 0, WIDTH / 2], [0, FOCAL, HEIGHT / 2], [0, 0, 1]])
         K[:2] *= scale
-        return View(K, T, (round(HEIGHT * scale), round(WIDTH * scale)))
+        return PinholeView(K, T, (round(HEIGHT * scale), round(WIDTH * scale)))
 
 
 def is_target(picture: Picture) -> NDArray[np.bool_]:

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from brrp_cli.errors import FrameError
 from brrp_cli.files import parse_json
 from brrp_cli.frames.build import make_frame
-from brrp_cli.frames.format import Format, Request, as_number, pick
+from brrp_cli.frames.format import Format, FrameRequest, as_number, pick
 from brrp_cli.frames.frame import Frame
 from brrp_cli.frames.pixels import read_colour, read_depth, read_masks
 
@@ -162,7 +162,7 @@ def scene_folders(path: Path) -> list[Path]:
     return []
 
 
-def read(path: Path, request: Request) -> Frame:
+def read(path: Path, request: FrameRequest) -> Frame:
     """The image that `--index` names: SCENE/IMAGE, or IMAGE in a scene's folder; the first one
     else. Errors: FrameError."""
     why = "BOP's scene_camera.json, which tells both"
@@ -187,7 +187,7 @@ def read(path: Path, request: Request) -> Frame:
     return read_image(scene, pick(images, number, names, scene))
 
 
-def names(path: Path, request: Request) -> list[str]:
+def names(path: Path, request: FrameRequest) -> list[str]:
     """SCENE/IMAGE of every image, or IMAGE in a scene's folder. Errors: FrameError."""
     found = []
     for scene in scene_folders(path):

@@ -6,14 +6,14 @@ from pathlib import Path
 
 from brrp_cli.frames.arrays import read_npy
 from brrp_cli.frames.build import make_frame
-from brrp_cli.frames.format import Format, Request
+from brrp_cli.frames.format import Format, FrameRequest
 from brrp_cli.frames.frame import Frame
 from brrp_cli.frames.pixels import read_colour
 
 FILES = ("rgb.jpg", "xyz.npy", "segmentation.npy")
 
 
-def read(folder: Path, request: Request) -> Frame:
+def read(folder: Path, request: FrameRequest) -> Frame:
     """Read a folder of BRRP's real scenes; K is fitted to the points.
 
     Errors: FrameError, also where the points are no pinhole image in the camera frame.

@@ -10,7 +10,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from brrp_cli.errors import FrameError
-from brrp_cli.frames.format import Format, Request, as_number
+from brrp_cli.frames.format import Format, FrameRequest, as_number
 from brrp_cli.frames.formats.folder import pairs_in
 from brrp_cli.frames.frame import Frame
 
@@ -35,7 +35,7 @@ def _format_of(path: Path) -> Format | None:
     return found[0] if len(found) == 1 else None
 
 
-def names(path: Path, request: Request) -> list[str]:
+def names(path: Path, request: FrameRequest) -> list[str]:
     """NAME, or NAME/FRAME, of every frame. Errors: FrameError of any part."""
     found = []
     for name, part in parts_in(path).items():
@@ -46,7 +46,7 @@ def names(path: Path, request: Request) -> list[str]:
     return found
 
 
-def read(path: Path, request: Request) -> Frame:
+def read(path: Path, request: FrameRequest) -> Frame:
     """The frame that --index names, or counts among all; the first else. Errors: FrameError."""
     parts = parts_in(path)
     index = request.index

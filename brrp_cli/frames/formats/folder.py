@@ -11,7 +11,7 @@ import re
 from pathlib import Path
 
 from brrp_cli.errors import FrameError
-from brrp_cli.frames.format import Format, Request
+from brrp_cli.frames.format import Format, FrameRequest
 from brrp_cli.frames.frame import Frame
 from brrp_cli.frames.recordings import (
     COLOUR_ENDINGS,
@@ -66,7 +66,7 @@ def find_intrinsics(folder: Path) -> Path:
     )
 
 
-def read(folder: Path, request: Request) -> Frame:
+def read(folder: Path, request: FrameRequest) -> Frame:
     """The frame that --index names or counts, the first else. Errors: FrameError."""
     intrinsics = request.intrinsics or find_intrinsics(folder)
     unit = "assumed; --depth-scale says otherwise"

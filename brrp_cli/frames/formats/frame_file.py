@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from brrp_cli.errors import FrameError
-from brrp_cli.frames.format import Format, Request
+from brrp_cli.frames.format import Format, FrameRequest
 from brrp_cli.frames.frame import Frame
 from brrp_cli.frames.npz import load_frame
 
@@ -15,7 +15,7 @@ _UNPICKLE = (
 )
 
 
-def read(path: Path, request: Request) -> Frame:
+def read(path: Path, request: FrameRequest) -> Frame:
     """See `load_frame`; masks may be missing. Errors: FrameError, also for contact_graspnet's .npy
     files, which are pickles and could run any code when they are loaded."""
     request.refuse(path, "one frame, with its K", index="--index", intrinsics="--intrinsics")

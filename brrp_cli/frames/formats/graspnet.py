@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from brrp_cli.errors import FrameError
 from brrp_cli.frames.arrays import read_npy
 from brrp_cli.frames.build import make_frame
-from brrp_cli.frames.format import Format, Request, pick
+from brrp_cli.frames.format import Format, FrameRequest, pick
 from brrp_cli.frames.frame import Frame
 from brrp_cli.frames.mat import read_meta
 from brrp_cli.frames.pixels import read_colour, read_depth, read_masks
@@ -45,7 +45,7 @@ def _is_camera(path: Path) -> bool:
     return all((path / name).is_dir() for name in ("rgb", "depth", "meta"))
 
 
-def names(path: Path, request: Request) -> list[str]:
+def names(path: Path, request: FrameRequest) -> list[str]:
     """scene_SSSS/CAMERA/IIII of every image; less of it below that."""
     return [
         f"{name}/{stem}".removeprefix("/")
@@ -54,7 +54,7 @@ def names(path: Path, request: Request) -> list[str]:
     ]
 
 
-def read(path: Path, request: Request) -> Frame:
+def read(path: Path, request: FrameRequest) -> Frame:
     """The image that --index names or counts, the first else. Errors: FrameError."""
     why = "GraspNet's meta, which tells both"
     request.refuse(path, why, depth_scale="--depth-scale", intrinsics="--intrinsics")

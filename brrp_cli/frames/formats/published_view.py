@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from brrp_cli.frames.format import Format, Request
+from brrp_cli.frames.format import Format, FrameRequest
 from brrp_cli.frames.frame import Frame
 from brrp_cli.frames.published import FILES, read_published
 
 
-def read(folder: Path, request: Request) -> Frame:
+def read(folder: Path, request: FrameRequest) -> Frame:
     """See `read_published`. Errors: FrameError."""
     request.refuse(folder, "one view, with its camera", index="--index", intrinsics="--intrinsics")
     return read_published(folder, depth_scale=request.depth_scale)

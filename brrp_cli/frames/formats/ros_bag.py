@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from brrp_cli.errors import BrrpError, DependencyError, FrameError
-from brrp_cli.frames.format import Format, Request, as_number
+from brrp_cli.frames.format import Format, FrameRequest, as_number
 from brrp_cli.frames.frame import Frame
 from brrp_cli.frames.ros_images import frame_of, is_depth
 
@@ -33,7 +33,7 @@ class _Choice:
     info: str
 
 
-def read(path: Path, request: Request) -> Frame:
+def read(path: Path, request: FrameRequest) -> Frame:
     """The colour image that --index counts, from 0, with the depth that is nearest in time.
 
     Topics are found by name and encoding; where several would do, --color-topic and --depth-topic
@@ -87,14 +87,14 @@ def read(path: Path, request: Request) -> Frame:
     return Frame(frame.rgb, frame.points, frame.segmap, frame.K, source=path)
 
 
-def names(path: Path, request: Request) -> list[str]:
+def names(path: Path, request: FrameRequest) -> list[str]:
     """The numbers of the colour images. Errors: as of `read`."""
     with _damage_told(path), _opened(path) as reader:
         color = _choose(reader, request, path).color
         return [str(number) for number in range(len(_times(reader, color)))]
 
 
-def contents(path: Path, request: Request) -> list[str]:
+def contents(path: Path, request: FrameRequest) -> list[str]:
     """The topics, with the type and the number of their messages. Errors: as of `read`."""
     with _damage_told(path), _opened(path) as reader:
         return [
@@ -165,7 +165,7 @@ def _stamp(pair: tuple[int, Any]) -> float:
     return seconds if seconds > 0 else pair[0] * 1e-9
 
 
-def _choose(reader: Any, request: Request, path: Path) -> _Choice:
+def _choose(reader: Any, request: FrameRequest, path: Path) -> _Choice:
     topics = {one.topic: one.msgtype for one in reader.connections}
     images = [topic for topic, kind in topics.items() if kind in _IMAGES]
     depths = [t for t in images if is_depth(next(_messages(reader, t), (0, None))[1])]

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from brrp_cli.dependencies import import_library
 from brrp_cli.errors import FrameError
 from brrp_cli.frames.build import make_frame
-from brrp_cli.frames.format import Format, Request, pick
+from brrp_cli.frames.format import Format, FrameRequest, pick
 from brrp_cli.frames.frame import Frame
 from brrp_cli.frames.intrinsics import read_intrinsics
 from brrp_cli.frames.pixels import read_colour, read_depth
@@ -34,7 +34,7 @@ _CAMERAS = {
 }
 
 
-def read(folder: Path, request: Request) -> Frame:
+def read(folder: Path, request: FrameRequest) -> Frame:
     """A colour image, by its place or its time, with the depth and the pose that belong to it.
 
     Errors: FrameError, also where no depth is near it in time or nobody tells the intrinsics.
@@ -51,7 +51,7 @@ def read(folder: Path, request: Request) -> Frame:
     )
 
 
-def names(folder: Path, request: Request) -> list[str]:
+def names(folder: Path, request: FrameRequest) -> list[str]:
     """The times of the colour images that have depth. Errors: FrameError."""
     return [time for time, _, _ in _pairs(folder)]
 
@@ -93,7 +93,7 @@ def _rows(path: Path) -> list[list[str]]:
     return [line.split() for line in lines if line.strip() and not line.startswith("#")]
 
 
-def _intrinsics(folder: Path, request: Request) -> NDArray[np.float64]:
+def _intrinsics(folder: Path, request: FrameRequest) -> NDArray[np.float64]:
     if request.intrinsics is not None:
         return read_intrinsics(request.intrinsics).K
     name = folder.resolve().name.lower()

@@ -42,7 +42,7 @@ class KernelBasis:
 
 
 @dataclass(frozen=True)
-class Block:
+class FeatureBlock:
     """Rows and columns of Phi outside of which nothing in these rows is non-zero.
 
     rows : (n,) int; columns : (a,) int, ascending, the bias last; values : (n, a) float64
@@ -69,7 +69,7 @@ class BlockFeatures:
 
     n: int
     size: int
-    blocks: list[Block]
+    blocks: list[FeatureBlock]
 
     def gram(self, weights: Floats) -> Floats:
         """Phi^T diag(weights) Phi, (size, size), of weights (n,), none negative."""
@@ -125,13 +125,13 @@ def _cubes(points: Floats, cell: float) -> list[tuple[NDArray[np.intp], Floats]]
 
 def _block(
     points: Floats, rows: NDArray[np.intp], corner: Floats, basis: KernelBasis, cell: float
-) -> Block:
+) -> FeatureBlock:
     gap = basis.hinges - np.clip(basis.hinges, corner, corner + cell)
     near = np.flatnonzero(np.einsum("ij,ij->i", gap, gap) <= basis.reach**2)
     difference = points[rows][:, None] - basis.hinges[near][None]
     values = np.exp(-basis.gamma * np.einsum("ijk,ijk->ij", difference, difference))
     values[values < basis.floor] = 0.0
-    return Block(
+    return FeatureBlock(
         rows=rows,
         columns=np.append(near, basis.size - 1),
         values=np.column_stack([values, np.ones(len(rows))]),

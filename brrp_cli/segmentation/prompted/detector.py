@@ -22,7 +22,7 @@ _TOKENS = 256
 
 
 @dataclass(frozen=True)
-class Found:
+class Detections:
     """Boxes (n, 4): left, top, right, bottom in pixels of the image; scores (n,), 0 to 1."""
 
     boxes: NDArray[np.float64]
@@ -51,7 +51,7 @@ class Detector:
         self._session = Session(model, "the detector", names, ["logits", "pred_boxes"])
         self._tokens = _Tokenizer(tokenizer)
 
-    def __call__(self, rgb: NDArray[np.uint8], phrase: str, threshold: float) -> Found:
+    def __call__(self, rgb: NDArray[np.uint8], phrase: str, threshold: float) -> Detections:
         """What one phrase names in the image (H, W, 3), best first. Errors: MaskError.
 
         A box's score is the sigmoid of its best token.
@@ -82,7 +82,7 @@ class Detector:
         corners = np.clip(corners, 0, 1) * [width, height, width, height]
         order = np.argsort(-scores, kind="stable")
         order = order[scores[order] > threshold]
-        return Found(corners[order], scores[order])
+        return Detections(corners[order], scores[order])
 
 
 def pixels(rgb: NDArray[np.uint8]) -> NDArray[np.float32]:

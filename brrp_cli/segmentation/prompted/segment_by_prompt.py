@@ -12,7 +12,7 @@ from brrp_cli.config.segmentation import PromptConfig, SegmentConfig
 from brrp_cli.dependencies import import_library
 from brrp_cli.errors import FrameError
 from brrp_cli.frames.frame import BACKGROUND, Frame
-from brrp_cli.segmentation.prompted.detector import Detector, Found, phrases
+from brrp_cli.segmentation.prompted.detector import Detections, Detector, phrases
 from brrp_cli.segmentation.prompted.mask_files import find_mask_files
 from brrp_cli.segmentation.prompted.segmenter import Segmenter
 from brrp_cli.segmentation.smooth_depth import flying_pixels
@@ -50,15 +50,15 @@ class PromptSegmenter:
         return layered(masks, frame, seed, self._config)
 
 
-def _small(found: list[Found], shape: tuple[int, int], config: PromptConfig) -> Found:
+def _small(found: list[Detections], shape: tuple[int, int], config: PromptConfig) -> Detections:
     boxes = np.concatenate([one.boxes for one in found])
     scores = np.concatenate([one.scores for one in found])
     area = (boxes[:, 2] - boxes[:, 0]) * (boxes[:, 3] - boxes[:, 1])
     kept = (area > 0) & (area < config.largest * shape[0] * shape[1])
-    return Found(boxes[kept], scores[kept])
+    return Detections(boxes[kept], scores[kept])
 
 
-def _apart(found: Found, overlap: float) -> NDArray[np.float64]:
+def _apart(found: Detections, overlap: float) -> NDArray[np.float64]:
     """Boxes (m, 4), best first, without those that an earlier one covers (greedy suppression)."""
     chosen: list[NDArray[np.float64]] = []
     for box in found.boxes[np.argsort(-found.scores, kind="stable")]:

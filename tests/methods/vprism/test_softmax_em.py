@@ -7,8 +7,8 @@ from scipy.special import logit, logsumexp
 
 from brrp_cli.methods.vprism.expected_softmax import expected_softmax
 from brrp_cli.methods.vprism.kernel_features import (
-    Block,
     BlockFeatures,
+    FeatureBlock,
     KernelBasis,
     kernel_features,
 )
@@ -19,7 +19,7 @@ def as_features(phi):
     """A dense matrix as one block."""
     rows, columns = np.arange(phi.shape[0]), np.arange(phi.shape[1])
     return BlockFeatures(
-        n=len(phi), size=phi.shape[1], blocks=[Block(rows, columns, phi, phi.shape[1])]
+        n=len(phi), size=phi.shape[1], blocks=[FeatureBlock(rows, columns, phi, phi.shape[1])]
     )
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from brrp_cli.completion.footprint import footprint
+from brrp_cli.completion.plan_rectangle import plan_rectangle
 from brrp_cli.completion.radial_profile import radial_profile
 from brrp_cli.config import CompletionConfig
 
@@ -21,7 +21,7 @@ def test_two_sides_of_a_box_give_its_rectangle(angle):
     """Two sides that meet at a corner span the whole rectangle, whichever way it is turned."""
     line = np.linspace(0, 1, 200)
     sides = np.concatenate([np.outer(line, [0.12, 0]), np.outer(line, [0, 0.05])])
-    found = footprint(turned(sides, angle) + [0.3, -0.2], CONFIG)
+    found = plan_rectangle(turned(sides, angle) + [0.3, -0.2], CONFIG)
     np.testing.assert_allclose(found.half, [0.06, 0.025], atol=0.003)
     middle, corner, out = turned(
         np.array([[0.06, 0.025], [0.119, 0.049], [0.06, 0.075]]), angle
@@ -34,7 +34,7 @@ def test_two_sides_of_a_box_give_its_rectangle(angle):
 @pytest.mark.parametrize("angle", [0.2, 1.0])
 def test_a_full_rectangle_is_found_too(angle):
     points = np.random.default_rng(0).uniform(-1, 1, (2000, 2)) * [0.06, 0.04]
-    found = footprint(turned(points, angle), CONFIG)
+    found = plan_rectangle(turned(points, angle), CONFIG)
     np.testing.assert_allclose(found.half, [0.06, 0.04], atol=0.004)
 
 
@@ -42,11 +42,11 @@ def test_strays_do_not_widen_the_rectangle():
     rng = np.random.default_rng(0)
     points = rng.uniform(-1, 1, (2000, 2)) * [0.05, 0.02]
     points[:5] += 0.5
-    assert footprint(points, CONFIG).half[0] < 0.06
+    assert plan_rectangle(points, CONFIG).half[0] < 0.06
 
 
 def test_a_rectangle_of_one_point_has_sides():
-    found = footprint(np.zeros((1, 2)), CONFIG)
+    found = plan_rectangle(np.zeros((1, 2)), CONFIG)
     assert (found.half > 0).all() and np.isfinite(found.outside(np.ones((3, 2)))).all()
 
 

@@ -13,7 +13,7 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Footprint:
+class PlanRectangle:
     """centre : (2,); axes : (2, 2), unit rows, the longer side's first; half : (2,) half of the
     sides' lengths, metres."""
 
@@ -29,7 +29,7 @@ class Footprint:
         )
 
 
-def footprint(points: Array, config: CompletionConfig) -> Footprint:
+def plan_rectangle(points: Array, config: CompletionConfig) -> PlanRectangle:
     """The rectangle about points (n, 2), metres, that is small and has the points near its sides.
 
     Area alone does not tell: two sides of a box fit as tightly with their diagonal along a side.
@@ -43,7 +43,7 @@ def footprint(points: Array, config: CompletionConfig) -> Footprint:
     half = np.maximum(high - low, config.least_side) / 2
     centre = (low + high) / 2 @ axes
     order = np.argsort(-half, kind="stable")
-    return Footprint(centre, axes[order], half[order])
+    return PlanRectangle(centre, axes[order], half[order])
 
 
 def _best(points: Array, angles: NDArray[np.floating], config: CompletionConfig) -> float:
