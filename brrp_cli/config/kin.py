@@ -16,7 +16,7 @@ class KinConfig:
     enabled : whether it is done; least_unknown : weight of "none of the stored objects" from which
     on it is done
     usual : metres, diagonal of what was seen up to which the lengths of fits hold as they stand
-        below; they grow with larger objects (kin/usual_size.py)
+        below; they grow with larger objects (kin/lengths.py)
 
     The shapes: of `objects` objects at most, evenly over the prior's names, in their `poses` most
     probable resting poses with a probability of `least_pose` or more. Coarse distances are kept at

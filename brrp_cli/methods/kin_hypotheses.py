@@ -16,11 +16,11 @@ from brrp_cli.inference.placed_shape import PlacedShape
 from brrp_cli.kin.evidence import Evidence, OtherDepth, gather
 from brrp_cli.kin.fit import Fits, fit_kin
 from brrp_cli.kin.kept_library import kin_library
+from brrp_cli.kin.lengths import for_size
 from brrp_cli.kin.library import Library
 from brrp_cli.kin.opening import opening
 from brrp_cli.kin.placement import distance_and_slopes
 from brrp_cli.kin.stretched import BentShape, bent_shape, unbent_shape
-from brrp_cli.kin.usual_size import for_size
 from brrp_cli.observation.support_plane import Plane
 from brrp_cli.prior.store import Prior
 from brrp_cli.seeds import child_rng

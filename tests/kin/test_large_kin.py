@@ -8,7 +8,7 @@ from table_scene import in_camera, photograph, placed
 
 from brrp_cli import open_prior, reconstruct
 from brrp_cli.config import preset
-from brrp_cli.kin.usual_size import LENGTHS, for_size
+from brrp_cli.kin.lengths import LENGTHS, for_size
 from brrp_cli.prior.build.build import build_prior
 from brrp_cli.prior.parameters import AppearanceConfig, BuildParameters
 from brrp_cli.shapes import solids
