@@ -22,6 +22,9 @@ _NOT_SUPPORTED = {errno.EINVAL, errno.ENOSYS, errno.ENOTSUP}
 _RENAME_EXCHANGE = 2
 _DIGITS = 18
 _AT_FDCWD = -100
+# What Python and NumPy say of text, and of so many values as do not belong there.
+_NO_NUMBER = "could not convert string to float: "
+_OTHER_COUNT = ("cannot reshape", "inhomogeneous", "setting an array element")
 
 
 def sha256_file(path: Path) -> str:
@@ -56,9 +59,29 @@ def read_text(path: Path) -> str:
 
 
 def trouble_of(error: Exception) -> str:
-    """What an error of a file says, in words and without its path, which `where` tells."""
-    said = error.strerror if isinstance(error, OSError) else None
-    return said or str(error)
+    """What an error of a file, or over what is in it, says: in words, on one line, without the path
+    that `where` tells and without the names of Python's errors."""
+    said = " ".join(str(error).split())
+    match error:
+        case OSError(strerror=str(why)):
+            return why
+        case KeyError(args=(str(key),)):
+            return key if " " in key else f"no {key}"
+        case UnicodeDecodeError():
+            return "bytes that are no UTF-8 text"
+        case TypeError() | AttributeError():
+            return "a value of another kind"
+        case IndexError():
+            return "too few values"
+        case OverflowError():
+            return "a number that is too large"
+    if said.startswith(_NO_NUMBER):
+        return f"{said.removeprefix(_NO_NUMBER)}, which is no number"
+    if any(words in said for words in _OTHER_COUNT):
+        return "another number of values"
+    if "pickle" in said:  # NumPy advises to load it unsafely
+        return "bytes that are no NumPy array"
+    return said or "damaged bytes"
 
 
 def parse_json(text: str | bytes) -> Any:

@@ -47,6 +47,23 @@ def counted(number: int, noun: str, nouns: str | None = None) -> str:
     return f"{number} {agreed(number, noun, nouns or f'{noun}s')}"
 
 
+def kind_of(value: object) -> str:
+    """What a value of a JSON file is."""
+    for kind, said in _KINDS:
+        if isinstance(value, kind):
+            return said
+    return "nothing"
+
+
+_KINDS = (
+    (bool, "true or false"),
+    ((int, float), "a number"),
+    (str, "text"),
+    (list, "a list"),
+    (dict, "keys with values"),
+)
+
+
 def agreed(number: int, one: str, many: str) -> str:
     """The word that goes with that number: `was` of one, `were` of several."""
     return one if number == 1 else many

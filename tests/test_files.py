@@ -4,6 +4,7 @@ import shutil
 from contextlib import suppress
 from pathlib import Path
 
+import numpy as np
 import pytest
 from file_faults import Steps, fail_at, in_a_process, kill_at, watched
 
@@ -266,3 +267,25 @@ def test_json_of_any_kind_is_a_value_error(text: str) -> None:
     with pytest.raises(ValueError, match=r"."):
         files.parse_json(text)
     assert files.parse_json('{"a": [1, -2.5, 999999999999999999]}')["a"][2] == 999999999999999999
+
+
+@pytest.mark.parametrize(
+    ("raised", "said"),
+    [
+        (lambda: {}["scale"], "no scale"),
+        (lambda: [][1], "too few values"),
+        (lambda: iter(3), "a value of another kind"),
+        (lambda: None.items(), "a value of another kind"),
+        (lambda: float("one"), "'one', which is no number"),
+        (lambda: int(float("inf")), "a number that is too large"),
+        (lambda: b"\xff".decode(), "bytes that are no UTF-8 text"),
+        (lambda: np.zeros(4).reshape(3, 3), "another number of values"),
+        (lambda: np.array([[1, 2], [3]], float), "another number of values"),
+        (lambda: Path("/none/there").read_text(), "No such file or directory"),
+        (lambda: next(iter([])), "damaged bytes"),
+    ],
+)
+def test_what_is_wrong_with_a_file_is_said_in_words(raised, said) -> None:
+    with pytest.raises(Exception) as caught:
+        raised()
+    assert files.trouble_of(caught.value) == said

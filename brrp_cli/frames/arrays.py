@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brrp_cli.errors import FrameError
-from brrp_cli.files import is_file
+from brrp_cli.files import is_file, trouble_of
 
 # 12 megapixels as float32 points, uint8 colours and a mask fit; a 249 KB file can unpack to more.
 MAX_BYTES = 128 * 2**20
@@ -40,12 +40,11 @@ def _damage_told(where: object, expected: str) -> Iterator[None]:
     try:
         yield
     except _DAMAGE as error:
-        found = getattr(error, "strerror", None) or str(error) or type(error).__name__
         raise FrameError(
             "The file cannot be read",
             where=where,
             expected=expected,
-            found=found,
+            found=trouble_of(error),
             fix="it is damaged, cut short or not what its name says: write or fetch it again",
         ) from error
 

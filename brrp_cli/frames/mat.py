@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from brrp_cli.dependencies import import_library
 from brrp_cli.errors import FrameError
+from brrp_cli.files import trouble_of
 from brrp_cli.frames.arrays import check_file
 
 MATRIX, FACTOR = "intrinsic_matrix", "factor_depth"
@@ -39,7 +40,7 @@ def read_meta(path: Path) -> Meta:
             "The meta.mat cannot be read",
             where=path,
             expected=f"MATLAB's format up to 7.2, with {MATRIX} and {FACTOR}",
-            found=f"{type(error).__name__}: {error}",
+            found=trouble_of(error),
         ) from error
     return Meta(_numbers(found, MATRIX, (3, 3), path), 1 / _factor(found, path))
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brrp_cli.errors import FrameError
-from brrp_cli.files import parse_json
+from brrp_cli.files import parse_json, trouble_of
 from brrp_cli.frames.arrays import read_npy, read_npz
 from brrp_cli.frames.build import make_frame
 from brrp_cli.frames.frame import BACKGROUND, Frame
@@ -119,7 +119,7 @@ def _objects_only(ids: NDArray[Any], objects: Path) -> NDArray[Any]:
             "objects.json cannot be read",
             where=objects,
             expected="a list of {id, mesh_path, position, orientation, scale}",
-            found=f"{type(error).__name__}: {error}",
+            found=trouble_of(error),
         ) from error
     if BACKGROUND in listed:
         raise FrameError(

@@ -24,6 +24,7 @@ from brrp_cli.frames.formats.bop import (
 from brrp_cli.frames.frame import Frame
 from brrp_cli.ground_truth.scenes import Scene
 from brrp_cli.ground_truth.truth import TrueObject
+from brrp_cli.spoken import kind_of
 
 # Some data sets have models of several kinds; the plain ones are what was scanned.
 _MODELS = ("models", "models_reconst", "models_cad", "models_eval")
@@ -74,7 +75,7 @@ def _images(folder: Path) -> list[BopScene]:
 def _entries(found: object, where: str) -> list[object]:
     if not isinstance(found, list):
         raise SceneError(
-            "Not a list of objects", where=where, expected="a list", found=type(found).__name__
+            "Not a list of objects", where=where, expected="a list", found=kind_of(found)
         )
     return found
 

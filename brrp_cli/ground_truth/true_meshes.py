@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from brrp_cli.files import atomic_path
+from brrp_cli.ground_truth.kept import read_kept
 from brrp_cli.ground_truth.pieces import count_pieces
 from brrp_cli.ground_truth.thickness import median_thickness
 from brrp_cli.ground_truth.truth import TrueObject, true_mesh
@@ -81,7 +82,8 @@ def close_truth(true_object: TrueObject, data_root: Path | None, cache: Path) ->
     """The object's closed meshes in world metres.
 
     They are closed in the frame of their file, whose axes decide how the published way thickens.
-    Errors: SceneError if the mesh is missing or does not load, MeshError if nothing closes it.
+    Errors: SceneError if the mesh is missing or does not load, or if what was kept is damaged;
+    MeshError if nothing closes it.
     """
     mesh = _in_its_own_frame(true_object, data_root)
     closed = ClosedMeshes(
@@ -110,8 +112,8 @@ def _repaired(mesh: trimesh.Trimesh, cache: Path) -> trimesh.Trimesh:
 
     kept = cache / f"{content_hash(mesh)}-settled.npz"
     if kept.exists():
-        with np.load(kept, allow_pickle=False) as arrays:
-            return trimesh.Trimesh(arrays["vertices"], arrays["faces"], process=False)
+        vertices, faces = read_kept(kept, "vertices", "faces")
+        return trimesh.Trimesh(vertices, faces, process=False)
     closed = repair(mesh).mesh
     with atomic_path(kept) as partial:
         np.savez_compressed(partial, vertices=closed.vertices, faces=closed.faces)
@@ -121,8 +123,8 @@ def _repaired(mesh: trimesh.Trimesh, cache: Path) -> trimesh.Trimesh:
 def _measured(mesh: trimesh.Trimesh, cache: Path) -> ExactMesh:
     kept = cache / f"{content_hash(mesh)}-thickness.npz"
     if kept.exists():
-        with np.load(kept, allow_pickle=False) as arrays:
-            return ExactMesh(mesh, float(arrays["thickness"]), int(arrays["pieces"]))
+        thickness, pieces = read_kept(kept, "thickness", "pieces")
+        return ExactMesh(mesh, float(thickness), int(pieces))
     found = ExactMesh(mesh, median_thickness(mesh), count_pieces(mesh))
     with atomic_path(kept) as partial:
         np.savez(partial, thickness=found.thickness, pieces=found.pieces)

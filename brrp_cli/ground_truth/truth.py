@@ -15,8 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brrp_cli.errors import SceneError
-from brrp_cli.files import is_file, parse_json
+from brrp_cli.files import is_file, parse_json, trouble_of
 from brrp_cli.geometry import similarity, transform_points
+from brrp_cli.spoken import kind_of
 
 # Folders in which the YCB archive keeps an object's meshes.
 _INNER = ("google_16k", "google_64k", "google_512k", "tsdf", "poisson", "clouds")
@@ -60,10 +61,12 @@ def read_objects(path: Path) -> list[TrueObject]:
     try:
         entries = parse_json(path.read_bytes())
     except (OSError, ValueError) as error:
-        raise SceneError("Cannot read the true objects", where=path, found=error) from error
+        raise SceneError(
+            "Cannot read the true objects", where=path, found=trouble_of(error)
+        ) from error
     if not isinstance(entries, list):
         raise SceneError(
-            "Not a list of objects", where=path, expected="a list", found=type(entries).__name__
+            "Not a list of objects", where=path, expected="a list", found=kind_of(entries)
         )
     objects = [_read_object(entry, f"{path}, entry {i}") for i, entry in enumerate(entries)]
     ids = [o.id for o in objects]
@@ -99,7 +102,9 @@ def true_mesh(true_object: TrueObject, data_root: Path | None) -> Any:
         # Without texture coordinates, vertices that a seam repeats are one.
         mesh = trimesh.Trimesh(loaded.vertices, loaded.faces)
     except Exception as error:  # trimesh's readers raise whatever they like
-        raise SceneError("An object's true mesh does not load", where=path, found=error) from error
+        raise SceneError(
+            "An object's true mesh does not load", where=path, found=trouble_of(error)
+        ) from error
     if len(mesh.faces) == 0:
         raise SceneError("An object's true mesh has no faces", where=path)
     mesh.apply_scale(true_object.unit)

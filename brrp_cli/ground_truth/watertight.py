@@ -20,6 +20,7 @@ import numpy as np
 from brrp_cli.dependencies import import_library
 from brrp_cli.errors import DependencyError
 from brrp_cli.files import atomic_path
+from brrp_cli.ground_truth.kept import read_kept
 
 if TYPE_CHECKING:
     import trimesh
@@ -34,14 +35,15 @@ def published_truth(
     """`mesh`, in its own frame and metres, made watertight at `resolution`.
 
     cache : a folder that keeps results by the content of the mesh; made if it is missing.
-    Errors: DependencyError without point-cloud-utils (`pip install 'brrp-cli[eval]'`).
+    Errors: DependencyError without point-cloud-utils (`pip install 'brrp-cli[eval]'`); SceneError
+    where what was kept is damaged.
     """
     import trimesh
 
     kept = None if cache is None else cache / f"{content_hash(mesh)}-{resolution}.npz"
     if kept is not None and kept.exists():
-        with np.load(kept, allow_pickle=False) as arrays:
-            return trimesh.Trimesh(arrays["vertices"], arrays["faces"], process=False)
+        vertices, faces = read_kept(kept, "vertices", "faces")
+        return trimesh.Trimesh(vertices, faces, process=False)
     try:
         pcu = import_library("point_cloud_utils")
     except DependencyError as error:

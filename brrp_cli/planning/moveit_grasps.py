@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brrp_cli.errors import ResultError
-from brrp_cli.files import parse_json
+from brrp_cli.files import parse_json, trouble_of
 from brrp_cli.planning.moveit import pose
 
 Array = NDArray[np.float64]
@@ -45,7 +45,7 @@ def stored_grasps(folder: Path) -> dict[str, list[dict[str, Any]]]:
         raise ResultError(
             "The grasps cannot be read",
             where=path,
-            found=f"{type(error).__name__}: {error}",
+            found=trouble_of(error),
             fix="run `brrp grasp` again, or remove the file",
         ) from error
 

@@ -22,7 +22,7 @@ from brrp_cli.descriptors.colour_histogram import COLOUR_BINS
 from brrp_cli.descriptors.descriptor import Appearance
 from brrp_cli.descriptors.point_pairs import PAIR_BINS
 from brrp_cli.errors import OutputError, PriorError
-from brrp_cli.files import atomic_path, sha256_file
+from brrp_cli.files import atomic_path, sha256_file, trouble_of
 from brrp_cli.prior.manifest import Manifest, ObjectEntry, ShardEntry
 from brrp_cli.prior.shard import damaged, open_shard, read_appearance
 
@@ -131,7 +131,7 @@ def row_type(parameters: dict[str, Any]) -> np.dtype[Any]:
     except (KeyError, TypeError, ValueError, OverflowError) as error:
         raise PriorError(
             "The prior's manifest does not say how its objects were looked at",
-            found=repr(error),
+            found=trouble_of(error),
             fix="run brrp build-prior again",
         ) from error
     return np.dtype(

@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from brrp_cli.errors import PriorError
-from brrp_cli.files import parse_json, write_bytes
+from brrp_cli.files import parse_json, trouble_of, write_bytes
 from brrp_cli.prior.names import APPEARANCE_NAME, SHARD_NAME, safe_name
 
 SCHEMA = 2
@@ -196,7 +196,7 @@ def _unusable(path: Path, error: Exception) -> PriorError:
     return PriorError(
         "The prior's manifest cannot be used",
         where=path,
-        found=f"{type(error).__name__}: {error}",
+        found=trouble_of(error),
         fix="restore the file, or run brrp build-prior again; finished shards are kept",
     )
 

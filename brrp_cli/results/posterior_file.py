@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from brrp_cli.errors import BrrpError
+from brrp_cli.files import trouble_of
 from brrp_cli.hdf5 import SharedParts, hdf5_bytes, members
 from brrp_cli.reconstruction import StoredPosterior
 
@@ -68,7 +69,7 @@ def read_posteriors(
         raise BrrpError(
             "The posterior file cannot be read",
             where=path,
-            found=error,
+            found=trouble_of(error),
             fix="run `brrp reconstruct` again",
         ) from error
 

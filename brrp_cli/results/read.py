@@ -15,14 +15,14 @@ from numpy.typing import NDArray
 from brrp_cli.config import SurfaceConfig
 from brrp_cli.config.tables import changed
 from brrp_cli.errors import ConfigError, ResultError
-from brrp_cli.files import parse_json
+from brrp_cli.files import parse_json, trouble_of
 from brrp_cli.frames.frame import Frame
 from brrp_cli.frames.npz import load_frame
 from brrp_cli.notebook import picture_html, result_html
 from brrp_cli.observation.support_plane import Plane
 from brrp_cli.reconstruction import StoredPosterior, Surface
 from brrp_cli.results.write import FRAME, POSTERIOR, PREVIEW, RECORD, SCHEMA, mesh_name
-from brrp_cli.spoken import counted
+from brrp_cli.spoken import counted, kind_of
 
 if TYPE_CHECKING:
     import trimesh
@@ -146,11 +146,11 @@ def open_result(folder: str | Path, open_posterior: OpenPosterior) -> StoredResu
             "There are no results that can be read",
             where=folder,
             expected=f"a folder that `brrp reconstruct` wrote, with {RECORD} in it",
-            found=error.strerror if isinstance(error, OSError) else error,
+            found=trouble_of(error),
             fix="give the folder that `brrp reconstruct` named in its last line",
         ) from error
     if not isinstance(record, dict) or record.get("schema") != SCHEMA:
-        found = record.get("schema") if isinstance(record, dict) else type(record).__name__
+        found = record.get("schema") if isinstance(record, dict) else kind_of(record)
         raise ResultError(
             "The results have another schema", where=path, expected=SCHEMA, found=found, fix=AGAIN
         )
@@ -165,7 +165,7 @@ def open_result(folder: str | Path, open_posterior: OpenPosterior) -> StoredResu
             "The record of the results is damaged",
             where=path,
             expected="what `brrp reconstruct` wrote",
-            found=f"{type(error).__name__}: {error}",
+            found=trouble_of(error),
             fix=AGAIN,
         ) from error
     return StoredResult(folder, record, open_posterior)
@@ -270,7 +270,7 @@ def _read_mesh(path: Path) -> trimesh.Trimesh:
             "A mesh of the results cannot be read",
             where=path,
             expected="a PLY with the scalar `uncertainty` on its vertices, as brrp writes it",
-            found=error,
+            found=trouble_of(error),
             fix=AGAIN,
         ) from error
     return mesh

@@ -9,6 +9,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from for_people import assert_for_people
 from PIL import Image
 from test_formats import image, info, write_bop, write_images, write_tum
 
@@ -79,6 +80,7 @@ def test_a_file_that_is_anything_is_read_or_refused(layouts, layout: str, name: 
             except BrrpError as error:
                 refused += 1
                 assert str(folder) in str(error)
+                assert_for_people(error)
     # Neither the truth nor the poses are needed for a frame.
     assert refused >= len(HARMFUL)
 
@@ -91,7 +93,8 @@ def test_a_bop_camera_with_any_value_is_read_or_refused(layouts, key: str) -> No
         path.write_text(json.dumps({"3": {**table["3"], key: value}}))
         try:
             frame = read_frame(path.parent)
-        except FrameError:
+        except FrameError as error:
+            assert_for_people(error)
             continue
         assert np.isfinite(frame.K).all() and np.isfinite(frame.points[frame.valid]).all()
         assert frame.T_world_cam is None or np.isfinite(frame.T_world_cam).all()
@@ -106,7 +109,8 @@ def test_a_bop_truth_with_any_value_is_read_or_refused(layouts, key: str) -> Non
         path.write_text(json.dumps(table))
         try:
             scenes = find_scenes(path.parent)
-        except (FrameError, SceneError):
+        except (FrameError, SceneError) as error:
+            assert_for_people(error)
             continue
         assert all(np.isfinite(o.T_world_object).all() for s in scenes for o in s.objects)
 

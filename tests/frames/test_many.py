@@ -7,6 +7,7 @@ import json
 import numpy as np
 import pytest
 import scipy.io
+from for_people import assert_for_people
 from PIL import Image
 from test_formats import assert_the_scene, write_bop, write_images
 
@@ -92,8 +93,9 @@ def test_a_meta_that_is_none_is_told(meta, says, scene, tmp_path):
         path.write_bytes(meta)
     else:
         scipy.io.savemat(path, meta)
-    with pytest.raises(FrameError, match=says):
+    with pytest.raises(FrameError, match=says) as caught:
         read_frame(tmp_path)
+    assert_for_people(caught.value)
 
 
 def test_names_of_every_format_read_the_frames_that_they_are_of(scene, tmp_path):

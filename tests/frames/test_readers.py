@@ -7,6 +7,7 @@ import logging
 
 import numpy as np
 import pytest
+from for_people import assert_for_people
 from PIL import Image
 
 from brrp_cli.errors import FrameError
@@ -105,7 +106,8 @@ def test_without_objects_json_negative_ids_are_background(scene, view):
         ("seg_mask.npy", np.ones((12, 16), int), "wrong shape"),
         ("rgb.jpg", b"junk", "image cannot be read"),
         ("../objects.json", b"{", "objects.json cannot be read"),
-        ("../objects.json", b'[{"name": 1}]', "objects.json cannot be read"),
+        ("../objects.json", b'[{"name": 1}]', r"objects.json cannot be read(.|\n)*no id"),
+        ("../objects.json", b"[3]", "objects.json cannot be read"),
         ("../objects.json", b'[{"id": 0}]', "background's id"),
     ],
 )
@@ -117,8 +119,9 @@ def test_a_damaged_view_is_told(view, name, content, message):
         path.write_bytes(content)
     else:
         np.save(path, content)
-    with pytest.raises(FrameError, match=message):
+    with pytest.raises(FrameError, match=message) as caught:
         read_frame(view)
+    assert_for_people(caught.value)
 
 
 def test_a_depth_scale_has_no_meaning_for_a_view(view):

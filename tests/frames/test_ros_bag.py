@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from for_people import assert_for_people
 
 from brrp_cli.cli import main
 from brrp_cli.errors import FrameError
@@ -113,8 +114,9 @@ def test_a_bag_without_depth_and_a_damaged_one_are_told(scene, tmp_path):
     with pytest.raises(FrameError, match="no depth topic"):
         read_frame(write(scene, tmp_path / "c.bag", True, leave_out="depth"))
     (tmp_path / "d.bag").write_bytes(b"#ROSBAG V2.0\njunk")
-    with pytest.raises(FrameError, match="bag cannot be read"):
+    with pytest.raises(FrameError, match="bag cannot be read") as caught:
         read_frame(tmp_path / "d.bag")
+    assert_for_people(caught.value)
 
 
 @pytest.mark.parametrize("ros1", [True, False], ids=["ros1", "ros2"])

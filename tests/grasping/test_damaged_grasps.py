@@ -6,6 +6,7 @@ import json
 
 import numpy as np
 import pytest
+from for_people import assert_for_people
 
 from brrp_cli.errors import ResultError
 from brrp_cli.grasping.drawing import stored_hands
@@ -40,6 +41,7 @@ def test_a_whole_one_is_read(tmp_path):
         ({"gripper": None}, False),
         ({"objects": [{"id": float("inf"), "grasps": WHOLE["objects"][0]["grasps"]}]}, True),
         ({"objects": [{"id": 7, "grasps": [{"T_cam_gripper": 3}]}]}, True),
+        ({"objects": [{"id": 7, "grasps": [{"score": 0.9}]}]}, True),
         ({"objects": 3}, True),
     ],
 )
@@ -47,5 +49,6 @@ def test_a_damaged_one_ends_nothing(tmp_path, change, refused):
     (tmp_path / RECORD).write_text(json.dumps(WHOLE | change))
     assert stored_hands(tmp_path) == {}
     if refused:
-        with pytest.raises(ResultError, match="grasps cannot be read"):
+        with pytest.raises(ResultError, match="grasps cannot be read") as caught:
             stored_grasps(tmp_path)
+        assert_for_people(caught.value)

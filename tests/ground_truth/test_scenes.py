@@ -3,6 +3,7 @@ import json
 import numpy as np
 import pytest
 import trimesh
+from for_people import assert_for_people
 from PIL import Image
 
 from brrp_cli.errors import FrameError, SceneError
@@ -165,6 +166,7 @@ def test_bad_truth_names_file_entry_and_key(tmp_path, entries, told):
     with pytest.raises(SceneError, match=told) as error:
         find_scenes(tmp_path / "s")
     assert "objects.json" in str(error.value)
+    assert_for_people(error.value)
 
 
 def test_equal_scale_of_each_axis_is_one_scale(tmp_path):

@@ -5,8 +5,9 @@ import sys
 import numpy as np
 import pytest
 import trimesh
+from for_people import assert_for_people
 
-from brrp_cli.errors import DependencyError
+from brrp_cli.errors import DependencyError, SceneError
 from brrp_cli.ground_truth.watertight import CHAMFER_RESOLUTION, IOU_RESOLUTION, published_truth
 from brrp_cli.raycast import inside
 from brrp_cli.shapes import solids
@@ -52,6 +53,21 @@ def test_the_kept_mesh_is_the_same_and_follows_the_content(tmp_path):
     published_truth(solids.box(0.1, 0.06, 0.21), 1000, cache)
     published_truth(box, 4000, cache)
     assert len(list(cache.iterdir())) == 3
+
+
+def test_a_damaged_kept_mesh_is_told(tmp_path):
+    box = solids.box(0.1, 0.06, 0.2)
+    published_truth(box, 1000, tmp_path)
+    (kept,) = tmp_path.iterdir()
+    whole = kept.read_bytes()
+    for damaged in (b"", b"junk", whole[: len(whole) // 2], bytes(200) + whole[200:]):
+        kept.write_bytes(damaged)
+        with pytest.raises(
+            SceneError, match=r"kept of a true mesh(.|\n)*remove the file"
+        ) as caught:
+            published_truth(box, 1000, tmp_path)
+        assert str(kept) in str(caught.value)
+        assert_for_people(caught.value)
 
 
 def test_without_the_extra_the_message_names_it(monkeypatch):

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from for_people import assert_for_people
 
 from brrp_cli.api import open_result
 from brrp_cli.cli import main
@@ -79,6 +80,7 @@ def test_any_value_in_any_place_is_refused_or_harmless(place, tmp_path: Path) ->
             stored = open_result(written(tmp_path, json.dumps(changed(place, value))))
         except ResultError as error:
             assert str(tmp_path) in str(error) and "brrp reconstruct" in str(error)
+            assert_for_people(error)
             continue
         assert np.isfinite(stored.T_frame_cam).all()
         assert stored.plane is None or np.isfinite(stored.plane.normal).all()

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brrp_cli.errors import FrameError
-from brrp_cli.files import parse_json
+from brrp_cli.files import parse_json, trouble_of
 from brrp_cli.frames.build import make_frame
 from brrp_cli.frames.format import Format, FrameRequest, as_number, pick
 from brrp_cli.frames.frame import Frame
@@ -38,7 +38,7 @@ def read_table(path: Path) -> dict[int, Any]:
             "The scene's file cannot be read",
             where=path,
             expected="JSON: image number -> its entry, as BOP writes it",
-            found=f"{type(error).__name__}: {error}",
+            found=trouble_of(error),
         ) from error
 
 
@@ -60,13 +60,13 @@ def rigid(entry: dict[str, Any], rotation: str, translation: str, where: object)
         T[:3, 3] = np.reshape(np.array(entry[translation], dtype=np.float64), 3) * MILLIMETRE
         turned = T[:3, :3] @ T[:3, :3].T
         if not (np.isfinite(T).all() and np.allclose(turned, np.eye(3), atol=_TURNED)):
-            raise ValueError("no rotation")
+            raise ValueError("a matrix that turns nothing, or not alone")
     except (KeyError, TypeError, ValueError) as error:
         raise FrameError(
             "A pose cannot be read",
             where=where,
             expected=f"{rotation} (9 numbers) and {translation} (3 numbers, millimetres)",
-            found=f"{type(error).__name__}: {error}",
+            found=trouble_of(error),
         ) from error
     return T
 
@@ -91,7 +91,7 @@ def read_image(folder: Path, image: int) -> Frame:
             "The image's camera cannot be read",
             where=where,
             expected="cam_K, 9 numbers; depth_scale, a number",
-            found=f"{type(error).__name__}: {error}",
+            found=trouble_of(error),
         ) from error
     T_world_cam = None
     if "cam_R_w2c" in camera and "cam_t_w2c" in camera:

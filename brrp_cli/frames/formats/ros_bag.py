@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from brrp_cli.errors import BrrpError, DependencyError, FrameError
+from brrp_cli.files import trouble_of
 from brrp_cli.frames.format import Format, FrameRequest, as_number
 from brrp_cli.frames.frame import Frame
 from brrp_cli.frames.ros_images import frame_of, is_depth
@@ -114,7 +115,7 @@ def _damage_told(path: Path) -> Iterator[None]:
             "The bag cannot be read",
             where=path,
             expected="a whole ROS 1 .bag, or a ROS 2 bag's folder with metadata.yaml",
-            found=f"{type(error).__name__}: {error}",
+            found=trouble_of(error),
             fix="reindex it: rosbag reindex (ROS 1), ros2 bag reindex (ROS 2)",
         ) from error
 

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from brrp_cli.dependencies import import_library
 from brrp_cli.errors import FrameError
+from brrp_cli.files import trouble_of
 from brrp_cli.frames.build import make_frame
 from brrp_cli.frames.format import Format, FrameRequest, pick
 from brrp_cli.frames.frame import Frame
@@ -83,7 +84,7 @@ def _listed(path: Path) -> list[tuple[str, str]]:
             "The list cannot be read",
             where=path,
             expected="lines of a time in seconds and a file",
-            found=f"{type(error).__name__}: {error}",
+            found=trouble_of(error),
         ) from error
 
 
@@ -132,7 +133,7 @@ def _pose(path: Path, time: float) -> NDArray[np.float64] | None:
             "The poses cannot be read",
             where=path,
             expected="lines of time tx ty tz qx qy qz qw",
-            found=error,
+            found=trouble_of(error),
         ) from error
 
 

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brrp_cli.errors import MeshError
+from brrp_cli.files import trouble_of
 from brrp_cli.prior.parameters import UNITS
 
 if TYPE_CHECKING:
@@ -76,7 +77,9 @@ def load_painted(path: Path, units: str = "m") -> PaintedMesh:
             if len(getattr(mesh, "faces", ()))
         ]
     except Exception as error:  # trimesh's readers raise whatever the file made them stumble over
-        raise MeshError("The mesh's colours cannot be read", where=path, found=error) from error
+        raise MeshError(
+            "The mesh's colours cannot be read", where=path, found=trouble_of(error)
+        ) from error
     return PaintedMesh(tuple(parts))
 
 
