@@ -36,6 +36,8 @@ def results_with(folder: Path, settings: dict[str, Any]) -> StoredResult | None:
     wanted = plain(settings)
     if found["segmentation"] is None:  # its masks came with it
         found["segmentation"] = wanted["segmentation"]
+    if found["masks"] is None:  # these, too: nobody made them by a prompt
+        found["masks"] = wanted["masks"] | {"prompt": None}
     one, other = _flat(wanted), _flat(found)
     different = sorted(key for key in one.keys() | other.keys() if one.get(key) != other.get(key))
     if different:
@@ -106,7 +108,15 @@ def _flat(settings: dict[str, Any], above: str = "") -> dict[str, Any]:
     return flat
 
 
+def _spelled(value: object) -> str:
+    """As JSON and TOML have it."""
+    return str(value).lower() if isinstance(value, bool) else str(value)
+
+
 def _shown(settings: dict[str, Any], keys: list[str]) -> str:
-    shown = [f"{key} {settings[key]}" if key in settings else f"no {key}" for key in keys[:SHOWN]]
+    shown = [
+        f"no {key}" if settings.get(key) is None else f"{key} {_spelled(settings[key])}"
+        for key in keys[:SHOWN]
+    ]
     more = len(keys) - SHOWN
     return ", ".join(shown) + (f", and {more} more" if more > 0 else "")

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from shlex import quote
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from brrp_cli.files import refuse_existing
 from brrp_cli.progress import note
@@ -30,6 +30,11 @@ class MadeMasks:
     config: SegmentConfig
     aside: NDArray[np.int64] | None
     corrected: frozenset[int] = frozenset()
+
+
+def masks_asked(source: SourceOptions) -> dict[str, Any]:
+    """What decides which masks are made on the way, besides numbers, as result.json holds it."""
+    return {"prompt": source.prompt, "all": source.keep_all}
 
 
 def make_masks(

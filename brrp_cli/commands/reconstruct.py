@@ -15,7 +15,13 @@ from brrp_cli.commands.exit_codes import SOME_FAILED
 from brrp_cli.commands.export import CONFIDENCE, check_libraries
 from brrp_cli.commands.grasp import GRIPPER_HELP
 from brrp_cli.commands.json_option import json_option, report_of
-from brrp_cli.commands.made_masks import MadeMasks, forget_picture, make_masks, masks_of
+from brrp_cli.commands.made_masks import (
+    MadeMasks,
+    forget_picture,
+    make_masks,
+    masks_asked,
+    masks_of,
+)
 from brrp_cli.commands.many_frames import Work, check_many, frame_slice, run_many
 from brrp_cli.commands.method_options import (
     CONFIG_HELP,
@@ -284,7 +290,15 @@ def command(
         # A stream is followed from its first frame, whatever of it was there.
         replaces = overwrite or track or again
         replaced = output.exists()
-        write_results(result, output, frame=coordinates, overwrite=replaces, read=read)
+        made = source.prompt is not None or not read.object_ids
+        write_results(
+            result,
+            output,
+            frame=coordinates,
+            overwrite=replaces,
+            read=read,
+            masks=masks_asked(source) if made else None,
+        )
         if replaced:
             forget_picture(read, result, source, output)
         table = told(result)
@@ -311,6 +325,7 @@ def command(
                 "prior": None if prior is None else prior.digest,
                 "config": as_record(config),
                 "segmentation": asdict(mask_config),
+                "masks": masks_asked(source),
             }
             work = Work(source, with_masks, one, beside, settings, overwrite, track)
             failed = run_many(work, frames, output, report)

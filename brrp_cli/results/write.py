@@ -4,6 +4,7 @@ frame that it is of."""
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from dataclasses import asdict
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -52,6 +53,7 @@ def write_results(
     frame: str = "camera",
     overwrite: bool = False,
     read: Frame | None = None,
+    masks: Mapping[str, Any] | None = None,
 ) -> list[Path]:
     """Write everything into `folder`, whole or not at all; returns the paths of the files.
 
@@ -59,6 +61,7 @@ def write_results(
 
     frame : "camera" or "world", the frame of the meshes (metres either way)
     read : the frame as it was read, before masks were made or mended, whose digest is recorded
+    masks : what was asked for where masks were made on the way, as the record holds it
 
     Errors: OutputError if the folder exists and `overwrite` is false, if it cannot be written, or
     if "world" is asked of a frame without T_world_cam.
@@ -75,7 +78,7 @@ def write_results(
         posteriors = {o.object_id: o.posterior for o in result.objects if o.posterior is not None}
         save_posteriors(posteriors, partial / POSTERIOR)
         save_frame(result.frame, partial / FRAME)
-        record = result_record(result, frame, read)
+        record = result_record(result, frame, read, masks)
         text = json.dumps(record, indent=2, allow_nan=False) + "\n"
         (partial / RECORD).write_text(text)
         caption = (
@@ -158,8 +161,14 @@ def _scene(meshes: dict[int, trimesh.Trimesh]) -> trimesh.Scene:
     return scene
 
 
-def result_record(result: Reconstruction, frame: str, read: Frame | None = None) -> dict[str, Any]:
-    """result.json: what was found, and all that it takes to find it again."""
+def result_record(
+    result: Reconstruction,
+    frame: str,
+    read: Frame | None = None,
+    masks: Mapping[str, Any] | None = None,
+) -> dict[str, Any]:
+    """result.json: what was found, and all that it takes to find it again. The arguments are those
+    of `write_results`."""
     source = result.frame.source
     T_target_cam = T_frame_cam(result.frame, frame)
     return {
@@ -184,6 +193,7 @@ def result_record(result: Reconstruction, frame: str, read: Frame | None = None)
         "seconds": _rounded(result.seconds),
         "config": result.configuration,
         "segmentation": result.segmentation,
+        "masks": None if masks is None else dict(masks),
         "versions": _versions(),
     }
 

@@ -92,6 +92,7 @@ def test_masks_that_were_made_otherwise_are_other_settings(tmp_path):
     record = json.loads((folder / "result.json").read_text())
     settings = {key: record[key] for key in ("method", "seed", "frame", "retriever", "config")}
     settings |= {"prior": record["prior"]["digest"], "segmentation": asdict(SegmentConfig())}
+    settings |= {"masks": {"prompt": None, "all": False}}
 
     def with_masks(made):
         (folder / "result.json").write_text(json.dumps(record | {"segmentation": made}))
@@ -335,6 +336,23 @@ def test_masks_that_are_made_on_the_way_are_no_change_of_the_source(source, tmp_
     again = run(source, "--frames", ":1", "-o", out)
     assert "Wrote 0 of 1 frame, 1 was there" in again.stdout, again.output
     assert "Masks: made" not in again.stderr
+
+
+def test_masks_that_were_asked_for_otherwise_are_told(source, tmp_path):
+    save_frame(load_frame(source / "f0.npz").without_masks(), source / "f0.npz")
+    out = tmp_path / "out"
+    assert run(source, "--frames", ":2", "-o", out).exit_code == 0
+    masks = [json.loads((out / f"f{i}.npz/result.json").read_text())["masks"] for i in (0, 1)]
+    assert masks == [{"prompt": None, "all": False}, None]
+    every = run(source, "--frames", ":1", "-o", out, "--all")
+    assert every.exit_code == 1
+    assert (
+        "expected: masks.all true" in every.output and "found:    masks.all false" in every.output
+    )
+    # The other one has masks of its own, which a prompt would replace and --all would not.
+    prompted = run(source, "--frames", "1:2", "-o", out, "--prompt", "mug")
+    assert prompted.exit_code == 1 and "expected: masks.prompt mug" in prompted.output
+    assert "1 was there" in run(source, "--frames", "1:2", "-o", out, "--all").stdout
 
 
 def test_results_that_do_not_tell_of_which_frame_they_are_stay(source, tmp_path):
