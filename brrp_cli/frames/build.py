@@ -215,19 +215,23 @@ def _depth_metres(raw: NDArray[Any], scale: float | None, source: Path | None) -
 
 def _without_largest(raw: NDArray[Any], source: Path | None) -> NDArray[Any]:
     """Depth with 0 for the largest number of an unsigned type, which sensors and programs write
-    where there is no return: 65535 would be a wall at 65 m."""
-    if raw.dtype.kind != "u":
+    where there is no return: 65535 would be a wall at 65 m. In a wider type it is that of the 16
+    bits which it came from, if nothing is larger."""
+    if raw.dtype.kind not in "iu":
         return raw
-    largest = np.iinfo(raw.dtype).max
+    kind = raw.dtype
+    if kind.itemsize > 2 and raw.max() == np.iinfo(np.uint16).max:
+        kind = np.dtype(np.uint16)
+    largest = np.iinfo(kind).max
     nothing = raw == largest
-    if not nothing.any():
+    if kind.kind != "u" or not nothing.any():
         return raw
     log.info(
         "%s: %s with %d, the largest number of %s: no return",
         source or "The frame",
         counted(int(nothing.sum()), "pixel"),
         largest,
-        raw.dtype,
+        kind,
     )
     return np.where(nothing, raw.dtype.type(0), raw)
 

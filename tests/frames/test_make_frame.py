@@ -222,6 +222,21 @@ def test_errors_of_intrinsics_and_units_say_what_to_do():
         assert error.value.fix, changes
 
 
+@pytest.mark.parametrize("dtype", [np.int32, np.int64, np.uint32])
+def test_the_largest_number_of_16_bits_is_no_return_in_a_wider_type(dtype, caplog):
+    depth = np.full(SHAPE, 900, dtype)
+    depth[:2, :2] = 65535
+    with caplog.at_level("INFO"):
+        frame = make_frame(**good(depth=depth))
+    assert not frame.valid[:2, :2].any() and frame.valid[2:].all()
+    assert "4 pixels with 65535, the largest number of uint16: no return" in caplog.text
+    # Among larger numbers it is one as any other.
+    depth = depth * dtype(10)
+    depth[0, 0], depth[0, 1] = 65535, 70000
+    frame = make_frame(**good(depth=depth), depth_scale=0.0001)
+    assert frame.points[0, 0, 2] == pytest.approx(6.5535)
+
+
 @pytest.mark.parametrize("dtype", [np.uint16, np.uint32])
 def test_the_largest_number_of_an_unsigned_type_is_no_return(dtype, caplog):
     caplog.set_level(logging.INFO)
