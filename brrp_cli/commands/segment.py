@@ -129,9 +129,9 @@ def command(
     unused = {"--all": source.keep_all, "--config": file is not None and not splits}
     for option, given in unused.items():
         if given and not made:
-            raise click.UsageError(
-                f"{option} is of masks that are made, and the source has some: add --again"
-            )
+            some = "--masks names some" if source.masks is not None else "the source has some"
+            fix = "leave out one of them" if source.masks is not None else "add --again"
+            raise click.UsageError(f"{option} is of masks that are made, and {some}: {fix}")
     if made:
         frame = source.make_masks(frame, seed, config)
     before = frame

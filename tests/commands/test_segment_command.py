@@ -156,6 +156,11 @@ def test_numbers_of_masks_that_are_kept_are_not_silently_unused(saved, tmp_path)
     options = ["--config", tmp_path / "c.toml", "-o", tmp_path / "g.npz"]
     assert "--config is of masks that are made" in run(saved[0], *options).output
     assert run(saved[0], *options, "--split", 4).exit_code == 0
+    np.save(tmp_path / "own.npy", saved[1].segmap)
+    own = run(saved[0], *options, "--masks", tmp_path / "own.npy", "--overwrite")
+    assert own.exit_code == 2
+    assert "--masks names some: leave out one of them" in own.output
+    assert "--again" not in own.output, "which --masks excludes"
 
 
 def test_ids_that_16_bits_do_not_hold_are_corrected_without_their_image(saved, tmp_path):
