@@ -19,6 +19,7 @@ from brrp_cli.config import MeanConfig
 from brrp_cli.frames.dilate import dilated
 from brrp_cli.frames.frame import BACKGROUND, Frame
 from brrp_cli.frames.projection import at_pixels, depth_behind
+from brrp_cli.geometry import grid_nodes
 from brrp_cli.observation.support_plane import Plane
 
 Array = NDArray[np.float64]
@@ -37,9 +38,7 @@ def network_grid(
     # One node more at the end where the last one would have none after it.
     odd = np.pad(near, [(0, 1 - n % 2) for n in near.shape])[::2, ::2, ::2]
     steps = [np.arange(n) * 2 for n in odd.shape]
-    at = nodes[0, 0, 0] + (nodes[1, 1, 1] - nodes[0, 0, 0]) * np.stack(
-        np.meshgrid(*steps, indexing="ij"), axis=-1
-    )
+    at = nodes[0, 0, 0] + (nodes[1, 1, 1] - nodes[0, 0, 0]) * grid_nodes(steps)
     thinks = _network(part)
     asked = np.full(odd.shape, -config.limit, np.float32)
     asked[odd] = thinks(at[odd])

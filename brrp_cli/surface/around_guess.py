@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from brrp_cli.config import SurfaceConfig
 from brrp_cli.dependencies import import_library
+from brrp_cli.geometry import grid_nodes
 from brrp_cli.reconstruction import Axes
 from brrp_cli.surface.extract import own_part
 
@@ -56,7 +57,7 @@ def grown_by_guess(
     inner = np.abs(observed - (low + high) / 2) < (high - low) / 2 - config.around_seen
     observed = observed[inner.all(axis=1)]
     spacing = float(axes[0][1] - axes[0][0])
-    nodes = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
+    nodes = grid_nodes(axes)
     seen = spatial.cKDTree(observed)
     beyond, nearest = ndimage.distance_transform_edt(volume < 1, return_indices=True)
     beyond *= spacing

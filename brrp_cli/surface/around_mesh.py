@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brrp_cli.config import SurfaceConfig
-from brrp_cli.geometry import transform_points
+from brrp_cli.geometry import grid_nodes, transform_points
 from brrp_cli.inference.placed_shape import PlacedShape
 from brrp_cli.reconstruction import Axes
 from brrp_cli.surface.alike import every_alike
@@ -40,7 +40,7 @@ def beyond_reach(shape: PlacedShape, reach: Array, axes: Axes, further: float) -
     reach : (n,) metres by which the region goes beyond each vertex, outwards; that of a face is the
     largest of its corners
     """
-    nodes = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
+    nodes = grid_nodes(axes).reshape(-1, 3)
     local = transform_points(np.linalg.inv(shape.T_cam_shape), nodes)
     spacing = float(axes[0][1] - axes[0][0])
     band = max(float(np.abs(reach).max()), 0.0) + further + 2 * spacing

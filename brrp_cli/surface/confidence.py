@@ -40,6 +40,7 @@ from numpy.typing import NDArray
 from scipy.special import ndtri
 
 from brrp_cli.config import SurfaceConfig
+from brrp_cli.geometry import grid_nodes
 from brrp_cli.inference.hypothesis_posterior import HypothesisPosterior
 from brrp_cli.inference.particles import particle_shares, particle_volumes
 from brrp_cli.inference.placed_shape import PlacedShape
@@ -208,7 +209,7 @@ def _less_margin(
     """Metres beyond a region that is wider by `margin` where it was not seen to be `empty`."""
     may_grow = (beyond > 0) & (beyond < 2 * margin)
     if empty is not None:
-        nodes = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1, dtype=np.float64)
+        nodes = grid_nodes(axes).astype(np.float64)
         may_grow[may_grow] = ~empty(nodes[may_grow])
     return np.where(may_grow, beyond - margin, beyond)
 
@@ -235,7 +236,7 @@ def _grown(
     distance = distance_transform_edt(volume < 1) * spacing
     may_grow = (distance > 0) & (distance < margin + spacing)
     if empty is not None:
-        nodes = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
+        nodes = grid_nodes(axes)
         may_grow[may_grow] = ~empty(nodes[may_grow])
     grown = np.where(may_grow, np.maximum(volume, 1 + (margin - distance) / spacing), volume)
     return grown, axes

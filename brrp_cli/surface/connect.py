@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brrp_cli.config import SurfaceConfig
+from brrp_cli.geometry import grid_nodes
 
 Region = NDArray[np.bool_]
 Nodes = NDArray[np.int64]
@@ -184,7 +185,7 @@ def _thick(way: Nodes, shape: tuple[int, ...], radius: float) -> Region:
     """Nodes within `radius` >= 1 nodes of those of a way (n, 3): connected along the axes, although
     a way may step along a diagonal."""
     reach = int(radius)
-    steps = np.stack(np.meshgrid(*[np.arange(-reach, reach + 1)] * 3, indexing="ij"), axis=-1)
+    steps = grid_nodes([np.arange(-reach, reach + 1)] * 3)
     ball = steps.reshape(-1, 3)
     ball = ball[(ball**2).sum(axis=1) <= radius**2]
     nodes = (way[:, None] + ball).reshape(-1, 3)
