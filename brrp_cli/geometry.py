@@ -10,7 +10,9 @@ from collections.abc import Iterable
 from typing import TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
+
+from brrp_cli.errors import BrrpError
 
 Array = NDArray[np.floating]
 Number = TypeVar("Number", bound=np.generic)
@@ -19,6 +21,25 @@ _COUNTED = 4
 
 # Up in the image, where no table says it: cameras look along z, with y down.
 IMAGE_UP = np.array([0.0, -1.0, 0.0])
+
+
+def as_points(points: ArrayLike) -> Array:
+    """Points (n, 3) as an array. Errors: BrrpError for anything else."""
+    try:
+        found = np.asarray(points)
+    except ValueError:  # rows of several lengths
+        found = np.empty(0, dtype=object)
+    if found.ndim == 2 and found.shape[1] == 3 and found.dtype.kind in "iuf":
+        return found
+    numbers = found.dtype.kind in "iuf"
+    raise BrrpError(
+        "These are no points",
+        expected="numbers (n, 3): metres, camera frame",
+        found=f"an array {found.shape}" if numbers else "what makes no array of numbers",
+        fix="give one point as [[x, y, z]]"
+        if numbers and found.shape == (3,)
+        else "give x, y and z of each point: [[x, y, z], ...]",
+    )
 
 
 def transform_points(T_target_source: Array, points: Array) -> Array:

@@ -46,7 +46,8 @@ class OccupancyPosterior(Protocol):
         """(2, 3) metres, camera frame: lower and upper corner."""
 
     def probability(self, points: NDArray[np.floating]) -> NDArray[np.float32]:
-        """Occupancy probability (n,) at points (n, 3), metres, camera frame."""
+        """Occupancy probability (n,) at points (n, 3), metres, camera frame. Errors: BrrpError for
+        what are no points."""
 
     def probability_volume(self, axes: Axes) -> NDArray[np.float32]:
         """Occupancy probability (nx, ny, nz) on a grid of camera-frame coordinates, metres."""

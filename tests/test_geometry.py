@@ -2,7 +2,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from brrp_cli.errors import BrrpError
 from brrp_cli.geometry import (
+    as_points,
     backproject,
     bounds,
     cells_of,
@@ -104,3 +106,24 @@ def test_a_rotation_turns_by_its_angle(degrees):
     axis = np.array([1.0, -2.0, 0.5])
     turn = Rotation.from_rotvec(np.radians(degrees) * axis / np.linalg.norm(axis)).as_matrix()
     assert np.degrees(rotation_angle(turn)) == pytest.approx(degrees, abs=1e-5)
+
+
+@pytest.mark.parametrize("points", [[[1, 2, 3]], np.zeros((0, 3)), np.ones((4, 3), np.float32)])
+def test_points_stay_what_they_are(points) -> None:
+    np.testing.assert_array_equal(as_points(points), points)
+
+
+@pytest.mark.parametrize(
+    ("points", "told"),
+    [
+        ([1, 2], r"\(2,\)(.|\n)*\[\[x, y, z\], \.\.\.\]"),
+        ([1, 2, 3], r"\(3,\)(.|\n)*one point as \[\[x, y, z\]\]"),
+        (np.zeros((2, 3, 3)), r"\(2, 3, 3\)"),
+        ([[1, 2, 3], [4, 5]], "no array of numbers"),
+        ([["a", "b", "c"]], "no array of numbers"),
+        (None, "no array of numbers"),
+    ],
+)
+def test_what_are_no_points_is_told(points, told) -> None:
+    with pytest.raises(BrrpError, match=told):
+        as_points(points)

@@ -10,7 +10,7 @@ import torch
 from numpy.typing import NDArray
 
 from brrp_cli.config.inference import SpreadConfig
-from brrp_cli.geometry import moved_box
+from brrp_cli.geometry import as_points, moved_box
 from brrp_cli.inference.mean_grid import MeanGrid
 from brrp_cli.inference.placed_shape import PlacedShape
 from brrp_cli.inference.posterior import LOGISTIC_DEVIATION, HilbertPosterior
@@ -137,8 +137,8 @@ class HypothesisPosterior:
 
     def probability(self, points: NDArray[np.floating]) -> NDArray[np.float32]:
         """Occupancy probability (n,): mean over particles of sigmoid(m + w . phi); 0 out of
-        bounds."""
-        points = np.asarray(points)
+        bounds. Errors: BrrpError for what are no points (n, 3)."""
+        points = as_points(points)
         inside = self._inside(points)
         found = np.zeros(len(points), np.float32)
         found[inside] = self.mean_occupancy(self.logits(points[inside]))

@@ -9,7 +9,7 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from brrp_cli.geometry import grid_nodes, inverse, moved_box, transform_points
+from brrp_cli.geometry import as_points, grid_nodes, inverse, moved_box, transform_points
 from brrp_cli.hdf5 import stored_motion
 from brrp_cli.inference.hinge import HingeGrid, factors, grid_logits
 from brrp_cli.reconstruction import LOGIT_VARIANCE, Axes
@@ -56,8 +56,8 @@ class HilbertPosterior:
         return replace(self, T_cam_map=T)
 
     def logits(self, points: NDArray[np.floating]) -> NDArray[np.float32]:
-        """w . phi (P, n) at points (n, 3), metres, camera frame."""
-        points = np.asarray(points, np.float64)
+        """w . phi (P, n) at points (n, 3), metres, camera frame. Errors: BrrpError."""
+        points = as_points(points).astype(np.float64)
         if self.T_cam_map is not None:
             points = transform_points(inverse(self.T_cam_map), points)
         # Centre in float64: kernels of centimetres leave no room for float32 far from the origin.

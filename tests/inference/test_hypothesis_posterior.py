@@ -217,6 +217,14 @@ def test_the_heaviest_hypothesis_alone_is_the_mean_of_its_own_particles():
     assert second.weights == pytest.approx([1])
 
 
+@pytest.mark.parametrize("ask", ["probability", "uncertainty"])
+def test_it_is_asked_at_points_alone(ask):
+    for posterior_ in (mixed(), mixed().correction):
+        assert getattr(posterior_, ask)([[0.1, -0.2, 0.9]]).shape == (1,)
+        with pytest.raises(BrrpError, match="no points"):
+            getattr(posterior_, ask)([1, 2])
+
+
 def test_the_file_gives_the_same_probabilities_and_the_same_bytes(tmp_path):
     two = mixed()
     plain = two.correction

@@ -21,6 +21,7 @@ from brrp_cli.config.tables import changed
 from brrp_cli.device import pick_device
 from brrp_cli.files import sha256_file
 from brrp_cli.frames.frame import BACKGROUND, Frame
+from brrp_cli.geometry import as_points
 from brrp_cli.inference.posterior import LOGISTIC_DEVIATION
 from brrp_cli.methods.base import Setup
 from brrp_cli.methods.coarse_to_fine import coarse_to_fine_volume
@@ -92,7 +93,7 @@ class PointSDFPosterior:
 
     def probability(self, points: NDArray[np.floating]) -> NDArray[np.float32]:
         """Occupancy probability (n,) at points (n, 3), metres, camera frame; 0 outside `bounds`."""
-        points = np.asarray(points)
+        points = as_points(points)
         within = ((points >= self.bounds[0]) & (points <= self.bounds[1])).all(axis=1)
         result = np.zeros(len(points), dtype=np.float32)
         result[within] = _sigmoid(self.logits(points[within]))

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from brrp_cli.config import CoarseToFineConfig, VPrismConfig
 from brrp_cli.frames.frame import Frame
+from brrp_cli.geometry import as_points
 from brrp_cli.methods.base import Setup
 from brrp_cli.methods.coarse_to_fine import coarse_to_fine_volume
 from brrp_cli.methods.configuration import as_record
@@ -59,7 +60,7 @@ class VPrismPosterior:
 
     def probability(self, points: NDArray[np.floating]) -> NDArray[np.float32]:
         """Probability (n,) that points (n, 3), metres, camera frame, belong to this object."""
-        points = np.asarray(points)
+        points = as_points(points)
         inside = ((points >= self.bounds[0]) & (points <= self.bounds[1])).all(axis=1)
         classes = list(range(len(self.scene.mean)))
         mean, variance = self.scene.logits(points[inside], classes)
@@ -83,7 +84,7 @@ class VPrismPosterior:
 
     def uncertainty(self, points: NDArray[np.floating]) -> NDArray[np.float32]:
         """Variance (n,) of this object's logit against that of free space."""
-        _, variance = self.scene.logits(points, [FREE, self.label])
+        _, variance = self.scene.logits(as_points(points), [FREE, self.label])
         return variance.sum(axis=0).astype(np.float32)
 
     def write(self, group: h5py.Group, shared: SharedParts) -> None:
