@@ -8,6 +8,8 @@ from pathlib import Path
 from shlex import quote
 from typing import TYPE_CHECKING, Any
 
+import click
+
 from brrp_cli.files import refuse_existing
 from brrp_cli.progress import note
 from brrp_cli.spoken import counted
@@ -54,6 +56,27 @@ def make_masks(
     frame = require_objects(source.make_masks(frame, seed, config))
     tell_made(frame, source.prompt, output)
     return frame.with_masks(frame.segmap), MadeMasks(config, frame.aside)
+
+
+def own_or_made_masks(
+    source: SourceOptions,
+    frame: Frame,
+    output: Path,
+    seed: int,
+    config: SegmentConfig,
+    *,
+    overwrite: bool,
+) -> tuple[Frame, MadeMasks | None]:
+    """The frame with its own masks, as `masks_of`; where it has none, or a prompt asks for others,
+    as `make_masks`. UsageError for --all of a frame that has masks."""
+    if source.prompt is not None or not frame.object_ids:
+        return make_masks(source, frame, output, seed, config, overwrite=overwrite)
+    if source.keep_all:
+        raise click.UsageError(
+            "--all is of masks that are made, and the frame has some:"
+            " brrp segment SOURCE --again --all makes them anew"
+        )
+    return masks_of(frame, output, config, overwrite=overwrite)
 
 
 def tell_made(frame: Frame, prompt: str | None, output: Path) -> None:

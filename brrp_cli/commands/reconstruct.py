@@ -15,13 +15,7 @@ from brrp_cli.commands.exit_codes import SOME_FAILED
 from brrp_cli.commands.export import CONFIDENCE, check_libraries
 from brrp_cli.commands.grasp import GRIPPER_HELP
 from brrp_cli.commands.json_option import json_option, report_of
-from brrp_cli.commands.made_masks import (
-    MadeMasks,
-    forget_picture,
-    make_masks,
-    masks_asked,
-    masks_of,
-)
+from brrp_cli.commands.made_masks import MadeMasks, masks_asked, own_or_made_masks
 from brrp_cli.commands.many_frames import Work, check_many, frame_slice, run_many
 from brrp_cli.commands.method_options import (
     CONFIG_HELP,
@@ -31,11 +25,11 @@ from brrp_cli.commands.method_options import (
     methods_help,
     weights_help,
 )
-from brrp_cli.commands.object_table import Told, lines, told
 from brrp_cli.commands.retriever_option import RetrieverName
 from brrp_cli.commands.seed_option import SEED, SEED_HELP, device_option
 from brrp_cli.commands.source_options import SourceOptions, source_options
 from brrp_cli.commands.view import PAGE
+from brrp_cli.commands.write_frame import WriteFrame
 from brrp_cli.grasping.gripper_file import DEFAULT as DEFAULT_HAND
 from brrp_cli.grasping.gripper_file import open_gripper
 from brrp_cli.grasping.record import RECORD
@@ -210,12 +204,11 @@ def command(
     source.check()
     check_weights([method], [] if weights is None else [weights])
 
-    from brrp_cli.api import open_result
     from brrp_cli.config.segmentation import SegmentConfig
     from brrp_cli.methods.config_file import read_config
     from brrp_cli.methods.configuration import as_record
     from brrp_cli.methods.shared_work import started_later
-    from brrp_cli.results.write import check_output, write_results
+    from brrp_cli.results.write import check_output
 
     check_collision(collision, confidence)
     hand = check_gripper(grasp_it, gripper)
@@ -236,27 +229,15 @@ def command(
     mask_config = SegmentConfig() if own is None else own.segmentation()
 
     def with_masks(frame: Frame, folder: Path) -> tuple[Frame, MadeMasks | None]:
-        again = overwrite or frames is not None
         if track:  # the stream makes masks, and mends those that brrp made before
             return (frame.without_masks() if source.prompt else frame), None
-        if source.prompt is None and frame.object_ids:
-            if source.keep_all:
-                raise click.UsageError(
-                    "--all is of masks that are made, and the frame has some:"
-                    " brrp segment SOURCE --again --all makes them anew"
-                )
-            return masks_of(frame, folder, mask_config, overwrite=again)
-        return make_masks(source, frame, folder, seed, mask_config, overwrite=again)
+        again = overwrite or frames is not None
+        return own_or_made_masks(source, frame, folder, seed, mask_config, overwrite=again)
 
     if frames is None:
         seen, masks = with_masks(read, output)
     prior, retrieval = open_prior_of(chosen, prior_path, config, retriever, clip_dir, seed)
-    if prior is not None and k is not None and k > len(prior.names):
-        note(f"--k {k}: all of the prior's {counted(len(prior.names), 'object')} are taken")
-    if prior is None:
-        came = chosen.own_weights
-        used = weights or (came and f"{came.stem} (what comes with brrp)")
-        note(f"Method: {method}, without a prior" + (f", weights {used}" if used else ""))
+    note_method(chosen, prior, k, weights)
     given: dict[str, Any] = {
         "prior": prior,
         "method": method,
@@ -282,37 +263,8 @@ def command(
         seed=seed,
     )
 
-    def one(
-        read: Frame, frame: Frame, masks: MadeMasks | None, output: Path, again: bool
-    ) -> list[Told]:
-        """Reconstruct a frame, write it all, and say what was written."""
-        result = do(frame, masks, output)
-        # A stream is followed from its first frame, whatever of it was there.
-        replaces = overwrite or track or again
-        replaced = output.exists()
-        made = source.prompt is not None or not read.object_ids
-        write_results(
-            result,
-            output,
-            frame=coordinates,
-            overwrite=replaces,
-            read=read,
-            masks=masks_asked(source) if made else None,
-        )
-        if replaced:
-            forget_picture(read, result, source, output)
-        table = told(result)
-        done = len(result.reconstructed)
-        for line in lines(table):
-            click.echo(line)
-        meshes = "object_*.ply, scene.glb, " if done else "no mesh: result.json says why; "
-        click.echo(
-            f"Wrote {done} of {counted(len(result.objects), 'object')}, metres,"
-            f" {coordinates} frame: {output}/ ({meshes}posterior.h5, result.json, preview.png)"
-        )
-        beside.write(open_result(output))
-        return table
-
+    # A stream is followed from its first frame, whatever of it was there.
+    one = WriteFrame(do, source, coordinates, overwrite or track, beside)
     with report_of(as_json) as report:
         report["output"] = str(output)
         report["frame"] = coordinates
@@ -351,6 +303,16 @@ def check_gripper(grasp_it: bool, gripper: str | None) -> Gripper | None:
     if gripper is not None and not grasp_it:
         raise click.UsageError("--gripper is of grasps: add --grasp")
     return open_gripper(gripper or DEFAULT_HAND) if grasp_it else None
+
+
+def note_method(method: Method, prior: Prior | None, k: int | None, weights: Path | None) -> None:
+    """Say what is tried where --k asks for more, and what a method without a prior uses."""
+    if prior is not None and k is not None and k > len(prior.names):
+        note(f"--k {k}: all of the prior's {counted(len(prior.names), 'object')} are taken")
+    if prior is None:
+        came = method.own_weights
+        used = weights or (came and f"{came.stem} (what comes with brrp)")
+        note(f"Method: {method.name}, without a prior" + (f", weights {used}" if used else ""))
 
 
 def open_prior_of(
