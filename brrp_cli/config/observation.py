@@ -8,6 +8,24 @@ from brrp_cli.config.ranges import between, share
 
 
 @dataclass(frozen=True)
+class ScatteredHolesConfig:
+    """Pixels without depth among others that have it (frames/scattered_holes.py).
+
+    A pixel has measured ones on both sides in its row or its column, no more than `reach` pixels
+    away, and these may lie on one surface that the line of sight meets at `grazing` degrees or
+    less from its normal. `passes` times, each with what was filled before. least : part of the
+    measured pixels that these are; where it is less, and fewer than `least_pixels`, they are the
+    few that every camera loses, and stay as they are
+    """
+
+    reach: int = between(3, 1, 100)
+    grazing: float = between(80.0, 0.0, 89.0)
+    passes: int = between(2, 1, 10)
+    least: float = share(0.06)
+    least_pixels: int = 1000
+
+
+@dataclass(frozen=True)
 class FloorConfig:
     """What lies around the objects, where that is not the largest plane: a bin's floor, a tray.
 

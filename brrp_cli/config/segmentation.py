@@ -269,6 +269,8 @@ class SegmentConfig:
         beyond `far` metres, max_height grows so, too
     rim : pixels that rise that part of it join an object within `reach`
     least_depth : part of the image that must have depth which neighbours agree on
+    steep : degrees between the line of sight and the table's normal, under which no side of the
+        image is its upper one
     margin : how far beside the seen table an object may stand
     min_area : objects that show less of themselves are dropped, metres squared; sure_part : that
         part of it is enough of what the network takes for an object with a probability of `sure`,
@@ -276,6 +278,7 @@ class SegmentConfig:
     """
 
     least_depth: float = share(0.01)
+    steep: float = between(15.0, 0.0, 90.0)
     min_height: float = 0.004
     max_height: float = 0.015
     far: float = 1.2

@@ -16,7 +16,7 @@ from PIL import Image
 from brrp_cli.errors import FrameError
 from brrp_cli.files import exists
 from brrp_cli.frames.arrays import check_file, read_npy
-from brrp_cli.frames.build import MAX_PIXELS
+from brrp_cli.frames.metres import MAX_PIXELS
 from brrp_cli.frames.misplaced import JOIN_MASKS
 
 # What holds masks, but not as one map of ids.

@@ -26,9 +26,10 @@ from brrp_cli.segmentation.reaching_in import reaching_in
 from brrp_cli.segmentation.refine_borders import refine_borders
 from brrp_cli.segmentation.region_growing import fill_holes, grow
 from brrp_cli.segmentation.rising import rising_in
-from brrp_cli.segmentation.seen_surfaces import see_surfaces
+from brrp_cli.segmentation.seen_surfaces import SeenSurfaces, see_surfaces
 from brrp_cli.segmentation.split_stacks import split_stacks
 from brrp_cli.segmentation.table_plane import Table
+from brrp_cli.segmentation.upright import quarter_turns, turned, turned_back
 
 log = logging.getLogger(__name__)
 
@@ -68,6 +69,20 @@ def segment_and_aside(
     are the masks, too. mending/strangers.py leaves out again what is not recognised among them."""
     config = config or SegmentConfig()
     seen = see_surfaces(frame, seed, config)
+    turns = quarter_turns(seen.table.plane, config)
+    if not turns:
+        return _parted(frame, seen, config, keep_all=keep_all)
+    upright = turned(frame, turns)
+    seen = see_surfaces(upright, seed, config)
+    found = _parted(upright, seen, config, keep_all=keep_all)
+    segmap, aside = (turned_back(each, turns) for each in found)
+    return _numbered(segmap, frame, config), aside
+
+
+def _parted(
+    frame: Frame, seen: SeenSurfaces, config: SegmentConfig, *, keep_all: bool
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """The same of a frame that is upright."""
     points, table = seen.points, seen.table
     area = _areas(frame)
     rises = rising_in(frame, seen, config)
