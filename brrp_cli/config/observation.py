@@ -13,9 +13,9 @@ class ScatteredHolesConfig:
 
     A pixel has measured ones on both sides in its row or its column, no more than `reach` pixels
     away, and these may lie on one surface that the line of sight meets at `grazing` degrees or
-    less from its normal. `passes` times, each with what was filled before. least : part of the
-    measured pixels that these are; where it is less, and fewer than `least_pixels`, they are the
-    few that every camera loses, and stay as they are
+    less from its normal. `passes` times, each with what was filled before.
+    least : part of the measured pixels, at least, that these holes are, and `least_pixels` of them;
+    fewer stay as they are, since every camera loses some
     """
 
     reach: int = between(3, 1, 100)
