@@ -65,6 +65,8 @@ class SimilarityConfig:
     neutral_colour, neutral_pairs : likeness where it cannot be judged, as in a frame without
         colours: about what an object that is rightly found has; plain_colour : that of a mesh
         without colours, less, since any colour might have been seen of it
+    without_hue : likeness that is taken off where an image has no hue, and lightness alone is
+        compared: many objects are as light. Of least loss on made scenes in grey
     size_spread : height and both sides of the footprint differ by so much without meaning
         anything; size_share : and by that part of the stored one
     blur : share of each colour that counts to either of the neighbouring bins of a* and b*: a plain
@@ -78,6 +80,7 @@ class SimilarityConfig:
     """
 
     neutral_colour: float = share(0.93)
+    without_hue: float = share(0.08)
     plain_colour: float = share(0.9)
     neutral_pairs: float = share(0.97)
     blur: float = share(0.2)

@@ -14,6 +14,8 @@ from brrp_cli.errors import FrameError
 from brrp_cli.spoken import counted
 
 BACKGROUND = 0
+# Of 255, by which the channels of a grey pixel differ, after compression too.
+NO_HUE = 4
 ONE_CAMERA = "colour, depth and masks must come from one camera at one resolution"
 
 
@@ -106,6 +108,12 @@ class Frame:
     def coloured(self) -> bool:
         """Whether pixels differ in colour: a frame that was made without is of one grey."""
         return bool(self.rgb.min() < self.rgb.max())
+
+    @cached_property
+    def hueless(self) -> bool:
+        """Whether the image is one of brightness alone, as of a monochrome camera."""
+        low, high = self.rgb.min(axis=-1), self.rgb.max(axis=-1)
+        return bool((high - low).max() <= NO_HUE)
 
     @cached_property
     def depth(self) -> NDArray[np.float32]:

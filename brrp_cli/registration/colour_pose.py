@@ -96,13 +96,14 @@ def print_agreement(
     (4, 4), with the image's at the same pixels; each channel about its own mean, and brightness
     about that of each side of its box, so that how light falls on it does not count. Less where
     there is little to compare: on a plain thing light and shadow decide. 0 where too little is seen
-    or nothing is printed.
+    or nothing is printed. Of an image without hue, brightness alone.
 
     lost : (H, W) pixels of the object that have no depth, where that alone would be too few"""
     seen = _seen(T_cam_model, model, frame, config, lost)
     if seen is None:
         return 0.0
-    stored, image = (_unshaded(each, seen.side) for each in (seen.stored, seen.image))
+    channels = 1 if frame.hueless else 3
+    stored, image = (_unshaded(each, seen.side)[:, :channels] for each in (seen.stored, seen.image))
     correlation, contrast = _correlation(stored, image, seen.cell, config.unprinted)
     return correlation * min(1.0, contrast / config.printed) ** 2
 

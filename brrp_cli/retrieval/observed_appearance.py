@@ -26,6 +26,7 @@ class ObservedAppearance:
     size : (3,) metres, height above the plane and footprint; None without plane or points
     points : (n, 3) metres, camera frame, without the plane's
     hidden : share of the silhouette that ends at something in front of it or at the image's edge
+    hueless : whether the image is one of brightness alone
     """
 
     colours: NDArray[np.float64] | None
@@ -34,6 +35,7 @@ class ObservedAppearance:
     size: NDArray[np.float64] | None
     points: NDArray[np.float64]
     hidden: float
+    hueless: bool = False
 
 
 def see_object(
@@ -55,7 +57,7 @@ def see_object(
     pairs = _pairs(points, config)
     size = None if plane is None or pairs is None else _size(points, plane, config)
     return ObservedAppearance(
-        colours, shares, pairs, size, points, _hidden(frame, mask, box, config)
+        colours, shares, pairs, size, points, _hidden(frame, mask, box, config), frame.hueless
     )
 
 

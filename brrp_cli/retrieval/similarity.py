@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brrp_cli.config.retrieval import SimilarityConfig
-from brrp_cli.descriptors.colour_histogram import AB_BINS, colour_histograms
+from brrp_cli.descriptors.colour_histogram import AB_BINS, L_BINS, colour_histograms
 from brrp_cli.descriptors.descriptor import roots
 from brrp_cli.retrieval.observed_appearance import ObservedAppearance
 from brrp_cli.retrieval.score_fusion import Similarity
@@ -19,20 +19,33 @@ def colour_likeness(
     stored: NDArray[np.uint8],
     lights: int,
     config: SimilarityConfig,
+    *,
+    hueless: bool = False,
 ) -> NDArray[np.float32]:
     """Bhattacharyya coefficient (g, m) of the most similar view, for histograms (g, b) of what is
     seen in g lights and stored views (m, v, b); where either has no colours, `neutral_colour` or
-    `plain_colour`."""
+    `plain_colour`. hueless : what is seen has no hue, so that lightness alone is compared"""
     count, views, bins = stored.shape
     if histograms is None:
         return np.full((lights, count), config.neutral_colour, np.float32)
-    seen = np.sqrt(blurred(histograms, config.blur))
     coloured = stored.any(axis=(1, 2))
     known = np.square(roots(stored[coloured].reshape(-1, bins)))
-    alike = seen @ np.sqrt(blurred(known, config.blur)).T
+    if hueless:
+        seen, known = lightness_alone(histograms), lightness_alone(known)
+    else:
+        seen, known = blurred(histograms, config.blur), blurred(known, config.blur)
+    seen = np.sqrt(seen)
+    alike = seen @ np.sqrt(known).T
     found = np.full((len(seen), count), config.plain_colour, np.float32)
     found[:, coloured] = alike.reshape(len(seen), -1, views).max(axis=-1, initial=0)
-    return found
+    # Many objects are as light: that one is says less for it.
+    return found - np.float32(config.without_hue) if hueless else found
+
+
+def lightness_alone(histograms: NDArray[np.floating]) -> NDArray[np.float32]:
+    """Histograms (n, L_BINS) of lightness, of those (n, COLOUR_BINS) of colours."""
+    by_lightness = histograms.astype(np.float32, copy=False).reshape(len(histograms), L_BINS, -1)
+    return np.asarray(by_lightness.sum(axis=-1))
 
 
 def blurred(histograms: NDArray[np.floating], share: float) -> NDArray[np.float32]:
@@ -94,7 +107,7 @@ def similarity(
     """All of it for stored descriptors (m,), which are those of the rows (m,) of the prior."""
     return Similarity(
         rows=rows,
-        colour=colour_likeness(histograms, stored["colour"], lights, config),
+        colour=colour_likeness(histograms, stored["colour"], lights, config, hueless=seen.hueless),
         pairs=pair_likeness(seen.pairs, stored["pairs"], config),
         size=size_penalty(seen.size, stored["sizes"], seen.hidden, config),
         hidden=seen.hidden,

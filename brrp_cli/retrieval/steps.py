@@ -46,7 +46,8 @@ class Steps:
         _, config, _ = self._made_of
         seen = see_object(image.frame, object_id, image.plane, config.retrieval.observed)
         histograms = lit_histograms(seen, self.gains)
-        rows = self._shortlist.rows(seen, histograms)
+        # The first look compares hues.
+        rows = self._shortlist.rows(seen, None if seen.hueless else histograms)
         stored = self._looks.rows(rows)
         look = similarity(
             seen, histograms, stored, rows, len(self.gains), config.retrieval.similarity

@@ -17,8 +17,8 @@ from brrp_cli.segmentation.agglomerate import borders_of
 from brrp_cli.segmentation.components import find_parts, split_at_strongest
 from brrp_cli.segmentation.concave_edges import depth_jumps, hollow_creases, surface_normals
 from brrp_cli.segmentation.learned_affinities import affinities_in
-from brrp_cli.segmentation.seen_surfaces import SeenSurfaces, see_surfaces, smoothed_depth
-from brrp_cli.segmentation.upright import quarter_turns, turned, turned_back
+from brrp_cli.segmentation.seen_surfaces import see_surfaces, smoothed_depth
+from brrp_cli.segmentation.upright import turned_back, upright
 
 log = logging.getLogger(__name__)
 
@@ -32,17 +32,10 @@ def boundary_of(frame: Frame, seed: int, config: SegmentConfig) -> NDArray[np.fl
     except FrameError:
         log.info("No table is seen: masks are cut at jumps of depth and hollow creases alone")
         return _without_a_table(frame, config)
-    turns = quarter_turns(seen.table.plane, config)
-    if not turns:
-        return _seen_boundary(frame, seen, config)
-    upright = turned(frame, turns)
-    seen = see_surfaces(upright, seed, config)
-    return turned_back(_seen_boundary(upright, seen, config), turns)
-
-
-def _seen_boundary(frame: Frame, seen: SeenSurfaces, config: SegmentConfig) -> NDArray[np.float64]:
-    affinities = affinities_in(frame, seen, config)
-    return np.maximum(affinities.restore(borders_of(affinities)), seen.jumps)
+    standing, seen, turns = upright(frame, seen, seed, config)
+    affinities = affinities_in(standing, seen, config)
+    boundary = np.maximum(affinities.restore(borders_of(affinities)), seen.jumps)
+    return turned_back(boundary, turns)
 
 
 def _without_a_table(frame: Frame, config: SegmentConfig) -> NDArray[np.float64]:

@@ -29,7 +29,7 @@ from brrp_cli.segmentation.rising import rising_in
 from brrp_cli.segmentation.seen_surfaces import SeenSurfaces, see_surfaces
 from brrp_cli.segmentation.split_stacks import split_stacks
 from brrp_cli.segmentation.table_plane import Table
-from brrp_cli.segmentation.upright import quarter_turns, turned, turned_back
+from brrp_cli.segmentation.upright import turned_back, upright
 
 log = logging.getLogger(__name__)
 
@@ -69,12 +69,10 @@ def segment_and_aside(
     are the masks, too. mending/strangers.py leaves out again what is not recognised among them."""
     config = config or SegmentConfig()
     seen = see_surfaces(frame, seed, config)
-    turns = quarter_turns(seen.table.plane, config)
+    standing, seen, turns = upright(frame, seen, seed, config)
+    found = _parted(standing, seen, config, keep_all=keep_all)
     if not turns:
-        return _parted(frame, seen, config, keep_all=keep_all)
-    upright = turned(frame, turns)
-    seen = see_surfaces(upright, seed, config)
-    found = _parted(upright, seen, config, keep_all=keep_all)
+        return found
     segmap, aside = (turned_back(each, turns) for each in found)
     return _numbered(segmap, frame, config), aside
 

@@ -1,5 +1,5 @@
 """Frames of a camera that hangs upside down or lies on its side, turned so that the table's upper
-side is up in the image: the networks have only seen such."""
+side is up in the image, as in nearly all that the networks have seen."""
 
 from __future__ import annotations
 
@@ -10,8 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brrp_cli.config.segmentation import SegmentConfig
+from brrp_cli.errors import FrameError
 from brrp_cli.frames.frame import Frame
 from brrp_cli.observation.support_plane import Plane
+from brrp_cli.segmentation.seen_surfaces import SeenSurfaces, see_surfaces
 
 Pixel = TypeVar("Pixel", bound=np.generic)
 
@@ -24,6 +26,31 @@ def quarter_turns(plane: Plane, config: SegmentConfig) -> int:
         return 0
     # Up is where x = 0 and y < 0. A turn counter-clockwise takes what is on the right up there.
     return int(np.rint(np.arctan2(right, -down) / (np.pi / 2))) % 4
+
+
+def upright(
+    frame: Frame, seen: SeenSurfaces, seed: int, config: SegmentConfig
+) -> tuple[Frame, SeenSurfaces, int]:
+    """The frame and what is seen in it after so many quarter turns, counter-clockwise, that it is
+    upright; as they are, and 0, where another table would be found then."""
+    turns = quarter_turns(seen.table.plane, config)
+    if not turns:
+        return frame, seen, 0
+    standing = turned(frame, turns)
+    try:
+        again = see_surfaces(standing, seed, config)
+    except FrameError:
+        return frame, seen, 0
+    expected = seen.table.plane.moved(turned_camera(turns)).normal
+    same = expected @ again.table.plane.normal > np.cos(np.radians(config.steep))
+    return (standing, again, turns) if same else (frame, seen, 0)
+
+
+def turned_camera(turns: int) -> NDArray[np.float64]:
+    """(4, 4) from the camera's frame to that of `turned`."""
+    T = np.eye(4)
+    T[:2, :2] = np.linalg.matrix_power(np.array([[0.0, 1.0], [-1.0, 0.0]]), turns % 4)
+    return T
 
 
 def turned(frame: Frame, turns: int) -> Frame:

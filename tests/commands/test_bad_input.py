@@ -203,14 +203,22 @@ def test_depth_that_is_no_depth(bad, folder):
     one_message(frame(folder, depth="depth.npy"), "depth.npy", "depth")
 
 
-@pytest.mark.parametrize("pixels", [5, 400, 4000])
-@pytest.mark.parametrize("random", [False, True], ids=["thinned", "noise"])
+@pytest.mark.parametrize(
+    ("pixels", "random"), [(5, False), (400, False), (5, True), (400, True), (4000, True)]
+)
 def test_sparse_depth_is_one_message(pixels, random, folder, good):
     rng = np.random.default_rng(0)
     depth = rng.integers(200, 3000, good[1].shape) if random else good[1]
     kept = rng.permutation(depth.size).reshape(depth.shape) < pixels
     Image.fromarray(np.where(kept, depth, 0).astype(np.uint16)).save(folder / "depth.png")
     one_message(frame(folder, "--segment", masks=None), "Too little depth", "pixels have depth")
+
+
+def test_a_twentieth_of_the_depth_is_enough_for_masks(folder, good):
+    kept = np.random.default_rng(0).permutation(good[1].size).reshape(good[1].shape) < 4000
+    Image.fromarray(np.where(kept, good[1], 0).astype(np.uint16)).save(folder / "depth.png")
+    result = frame(folder, "--segment", masks=None)
+    assert result.exit_code == 0 and "2 objects" in result.output
 
 
 def test_sparse_depth_below_given_masks_is_a_status(folder, good):

@@ -124,6 +124,22 @@ def seen_sides(model, T, frame):
     return vertices, top.reshape(frame.shape)
 
 
+def test_print_is_read_in_a_grey_image_too(scene) -> None:
+    """Red and blue of other brightness, as a monochrome camera sees them."""
+    model, T, frame = scene
+    grey = frame.rgb.mean(axis=-1, keepdims=True).repeat(3, axis=-1)
+    light = np.where(frame.rgb[..., :1] > frame.rgb[..., 2:], 180, 60).repeat(3, axis=-1)
+    frame = replace(frame, rgb=np.where(frame.segmap[..., None] == 1, light, grey).astype(np.uint8))
+    assert frame.hueless
+    ends = np.where(model.stored.shape.vertices[:, :1] > 0, [[240, 30, 30]], [[30, 30, 90]])
+    shape = replace(model.stored.shape, colours=ends.astype(np.uint8))
+    model = replace(model, stored=replace(model.stored, shape=shape))
+    back_to_front = T @ similarity(rotation=np.diag([-1.0, -1.0, 1.0]))
+    # Two of the box's sides are of one colour: these do not count.
+    assert print_agreement(T, model, frame, CONFIG) > 0.6
+    assert print_agreement(back_to_front, model, frame, CONFIG) < -0.6
+
+
 def raw_correlation(T, model, frame):
     """Of stored colours with the image's, each channel about its mean, light and shadow with it."""
     points = transform_points(T, model.stored.shape.vertices * model.stored.half_extent)

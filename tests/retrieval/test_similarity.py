@@ -85,6 +85,20 @@ def test_a_plain_colour_in_light_that_was_not_tried_is_still_alike():
     assert colour_likeness(red, stored, 1, LIKE) < 0.3
 
 
+def test_in_an_image_without_hue_lightness_alone_is_compared():
+    ones = np.ones((1, 3))
+
+    def histogram(rgb):
+        return colour_histograms(np.array([rgb], float), np.ones(1), ones)
+
+    red, its_grey = [190.0, 40, 35], [101.0, 101, 101]
+    stored = to_bytes(np.concatenate([histogram(red), histogram([250, 250, 250])]))[:, None]
+    seen = histogram(its_grey)
+    assert colour_likeness(seen, stored, 1, LIKE)[0, 0] < 0.3
+    found = colour_likeness(seen, stored, 1, LIKE, hueless=True)[0] + LIKE.without_hue
+    assert found[0] > 0.95 and found[1] < 0.5
+
+
 def test_the_best_view_counts():
     rng = np.random.default_rng(0)
     views = rng.dirichlet(np.full(COLOUR_BINS, 0.05), (3, 4))

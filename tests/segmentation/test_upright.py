@@ -10,11 +10,11 @@ import pytest
 from brrp_cli.config.segmentation import SegmentConfig
 from brrp_cli.frames.build import make_frame
 from brrp_cli.frames.frame import Frame
-from brrp_cli.geometry import backproject
+from brrp_cli.geometry import backproject, transform_points
 from brrp_cli.observation.support_plane import Plane
 from brrp_cli.segmentation.cut import boundary_of
 from brrp_cli.segmentation.segment import segment, segment_and_aside
-from brrp_cli.segmentation.upright import quarter_turns, turned, turned_back
+from brrp_cli.segmentation.upright import quarter_turns, turned, turned_back, turned_camera
 
 CONFIG = SegmentConfig()
 
@@ -28,6 +28,9 @@ def frame(scene) -> Frame:
 def test_a_turned_frame_is_what_a_turned_camera_sees(frame: Frame, turns: int) -> None:
     lying = turned(frame, turns)
     np.testing.assert_allclose(lying.points, backproject(lying.depth, lying.K), atol=1e-5)
+    there = transform_points(turned_camera(turns), frame.points.reshape(-1, 3).astype(float))
+    back = np.stack([turned_back(each, turns) for each in np.moveaxis(lying.points, -1, 0)], -1)
+    np.testing.assert_allclose(back.reshape(-1, 3), there, atol=1e-6)
     for image, other in ((frame.depth, lying.depth), (frame.segmap, lying.segmap)):
         np.testing.assert_array_equal(turned_back(other, turns), image)
     whole = turned(lying, 4 - turns)
