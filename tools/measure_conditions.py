@@ -1,6 +1,6 @@
 """What becomes of a frame's masks, and of what is recognised in it, if the camera were another one?
 
-    python tools/measure_conditions.py FRAMES... [--prior PRIOR] [--only half,turned,...]
+    python tools/measure_conditions.py FRAMES... [--prior PRIOR] [--only half,grey,...]
 
 Every frame (anything that `brrp frame` reads) is changed in each of CONDITIONS: depth with holes,
 coarse, noisy or moved against colour, images of other sizes, grey, on their side. Its own masks are

@@ -66,7 +66,8 @@ class SimilarityConfig:
         colours: about what an object that is rightly found has; plain_colour : that of a mesh
         without colours, less, since any colour might have been seen of it
     without_hue : likeness that is taken off where an image has no hue, and lightness alone is
-        compared: many objects are as light. Of least loss on made scenes in grey
+        compared: many objects are as light. Set on made scenes in grey, between two values of about
+        the same loss
     size_spread : height and both sides of the footprint differ by so much without meaning
         anything; size_share : and by that part of the stored one
     blur : share of each colour that counts to either of the neighbouring bins of a* and b*: a plain

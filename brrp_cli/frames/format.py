@@ -53,7 +53,7 @@ class Format:
     title : as messages name it; layout : the files that tell it
     matches : whether a path looks like it, by names alone
     read : the frame, without masks where the format has none. Errors: FrameError
-    names : the frames of a source that may hold many, as `Request.index` names them, in their
+    names : the frames of a source that may hold many, as `FrameRequest.index` names them, in their
         order; None for a format of one frame. Errors: FrameError
     contents : what else is in it, a line each, for `--list`. Errors: FrameError
     last : counts only where no other format matches

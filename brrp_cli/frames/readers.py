@@ -42,7 +42,7 @@ def read_frame(
 
 
 def list_frames(path: str | Path, request: FrameRequest | None = None) -> list[str]:
-    """The frames of a source, as `Request.index` names them, in their order.
+    """The frames of a source, as `FrameRequest.index` names them, in their order.
 
     A source of one frame has one, by the name of its file or folder. Errors: as of `read_frame`.
     """

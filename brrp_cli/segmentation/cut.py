@@ -17,8 +17,8 @@ from brrp_cli.segmentation.agglomerate import borders_of
 from brrp_cli.segmentation.components import find_parts, split_at_strongest
 from brrp_cli.segmentation.concave_edges import depth_jumps, hollow_creases, surface_normals
 from brrp_cli.segmentation.learned_affinities import affinities_in
-from brrp_cli.segmentation.seen_surfaces import see_surfaces, smoothed_depth
-from brrp_cli.segmentation.upright import turned_back, upright
+from brrp_cli.segmentation.seen_surfaces import smoothed_depth
+from brrp_cli.segmentation.upright import see_upright, turned_back
 
 log = logging.getLogger(__name__)
 
@@ -28,11 +28,10 @@ def boundary_of(frame: Frame, seed: int, config: SegmentConfig) -> NDArray[np.fl
     """Where one thing ends (H, W), 0 to 1: jumps of depth, and borders that the network sees, or
     hollow creases where there is no table, which it needs."""
     try:
-        seen = see_surfaces(frame, seed, config)
+        standing, seen, turns = see_upright(frame, seed, config)
     except FrameError:
         log.info("No table is seen: masks are cut at jumps of depth and hollow creases alone")
         return _without_a_table(frame, config)
-    standing, seen, turns = upright(frame, seen, seed, config)
     affinities = affinities_in(standing, seen, config)
     boundary = np.maximum(affinities.restore(borders_of(affinities)), seen.jumps)
     return turned_back(boundary, turns)

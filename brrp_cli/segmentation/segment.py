@@ -26,10 +26,10 @@ from brrp_cli.segmentation.reaching_in import reaching_in
 from brrp_cli.segmentation.refine_borders import refine_borders
 from brrp_cli.segmentation.region_growing import fill_holes, grow
 from brrp_cli.segmentation.rising import rising_in
-from brrp_cli.segmentation.seen_surfaces import SeenSurfaces, see_surfaces
+from brrp_cli.segmentation.seen_surfaces import SeenSurfaces
 from brrp_cli.segmentation.split_stacks import split_stacks
 from brrp_cli.segmentation.table_plane import Table
-from brrp_cli.segmentation.upright import turned_back, upright
+from brrp_cli.segmentation.upright import see_upright, turned_back
 
 log = logging.getLogger(__name__)
 
@@ -68,8 +68,7 @@ def segment_and_aside(
     and of what the border cuts a stored object tells the rest. Where there is nothing else, these
     are the masks, too. mending/strangers.py leaves out again what is not recognised among them."""
     config = config or SegmentConfig()
-    seen = see_surfaces(frame, seed, config)
-    standing, seen, turns = upright(frame, seen, seed, config)
+    standing, seen, turns = see_upright(frame, seed, config)
     found = _parted(standing, seen, config, keep_all=keep_all)
     if not turns:
         return found

@@ -28,11 +28,13 @@ def quarter_turns(plane: Plane, config: SegmentConfig) -> int:
     return int(np.rint(np.arctan2(right, -down) / (np.pi / 2))) % 4
 
 
-def upright(
-    frame: Frame, seen: SeenSurfaces, seed: int, config: SegmentConfig
-) -> tuple[Frame, SeenSurfaces, int]:
-    """The frame and what is seen in it after so many quarter turns, counter-clockwise, that it is
-    upright; as they are, and 0, where another table would be found then."""
+def see_upright(frame: Frame, seed: int, config: SegmentConfig) -> tuple[Frame, SeenSurfaces, int]:
+    """The frame, and what is seen in it, after so many quarter turns, counter-clockwise, that it is
+    upright; as it is, and 0, where another table would be found then.
+
+    Errors: as of `see_surfaces`.
+    """
+    seen = see_surfaces(frame, seed, config)
     turns = quarter_turns(seen.table.plane, config)
     if not turns:
         return frame, seen, 0
