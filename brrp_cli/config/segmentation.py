@@ -71,6 +71,7 @@ class AffinitiesConfig:
     least : that a pixel shows an object, or it is depth that bled
     alike : mean affinity of the pixels of two parts from which on they are one object: training
         counts pairs of two objects four times, so that less than a half is even
+    step : metres between the depths of two pixels from which on they are not alike
     components : the parts that are joined, in pixels of the network's image
     margin : pixels of that image beside what rises that the network sees, too
     """
@@ -78,6 +79,7 @@ class AffinitiesConfig:
     colour: float = share(0.5)
     least: float = share(0.1)
     alike: float = share(0.3)
+    step: float = 0.08
     components: ComponentsConfig = field(default_factory=lambda: ComponentsConfig(least_core=32))
     margin: int = 64
 

@@ -112,7 +112,10 @@ class Frame:
     @cached_property
     def hueless(self) -> bool:
         """Whether the image is one of brightness alone, as of a monochrome camera."""
-        low, high = self.rgb.min(axis=-1), self.rgb.max(axis=-1)
+        # Channel by channel: NumPy is slow along so short an axis.
+        red, green, blue = (self.rgb[..., channel] for channel in range(3))
+        high = np.maximum(np.maximum(red, green), blue)
+        low = np.minimum(np.minimum(red, green), blue)
         return bool((high - low).max() <= NO_HUE)
 
     @cached_property

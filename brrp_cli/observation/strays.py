@@ -6,7 +6,6 @@ from __future__ import annotations
 import logging
 import weakref
 from collections.abc import Collection, Iterator
-from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -59,8 +58,9 @@ def without_strays(
                     text = "Object %d: %s of its mask left out, %s"
                     log.log(logging.INFO if many else logging.DEBUG, text, object_id, count, why)
     if stray.any():
-        points = np.where(stray[..., None], np.float32(np.nan), frame.points)
-        frame = replace(frame, points=points)
+        points = frame.points.copy()
+        points[stray] = np.nan
+        frame = frame.with_points(points)
     _clean[id(frame), config] = frame
     return frame
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from brrp_cli.config.segmentation import AffinitiesConfig
 from brrp_cli.frames.dilate import mask_box
 from brrp_cli.segmentation.components import relabel
 from brrp_cli.segmentation.learned_affinities import Affinities
@@ -32,23 +33,33 @@ def borders_of(affinities: Affinities) -> NDArray[np.float64]:
 
 
 def join_alike_pixels(
-    parts: NDArray[np.int64], affinities: Affinities, least: float
+    parts: NDArray[np.int64],
+    affinities: Affinities,
+    depth: NDArray[np.floating],
+    config: AffinitiesConfig,
 ) -> NDArray[np.int64]:
     """Labels (h, w) after parts were joined, two at a time, those first whose pixels have the
-    highest mean affinity, as long as it is over `least`."""
+    highest mean affinity, as long as it is over `config.alike`.
+
+    depth : (h, w) metres, NaN where there is none. Two pixels with a step of more than
+        `config.step` between them count as not alike, whatever the network says: where depth is
+        missing around what stands in front, it sees no step.
+    """
     count = int(parts.max()) + 1
     total, pairs = np.zeros((2, count * count))
     window = mask_box(parts > 0, 0)
-    inside = parts[window]
+    inside, depth = parts[window], depth[window]
     for same, offset in zip(affinities.same, affinities.offsets, strict=True):
         pixel, partner = windows(offset, inside.shape)
         first, second = inside[pixel], inside[partner]
         asked = (first > 0) & (second > 0) & (first != second)
         codes = first[asked] * count + second[asked]
-        total += np.bincount(codes, same[window][pixel][asked], count * count)
+        step = np.abs(depth[pixel][asked] - depth[partner][asked]) > config.step
+        alike = np.where(step, 0, same[window][pixel][asked])
+        total += np.bincount(codes, alike, count * count)
         pairs += np.bincount(codes, minlength=count * count)
     sums, numbers = total.reshape(count, count), pairs.reshape(count, count)
-    return relabel(parts, _linked(sums + sums.T, numbers + numbers.T, least))
+    return relabel(parts, _linked(sums + sums.T, numbers + numbers.T, config.alike))
 
 
 def _linked(

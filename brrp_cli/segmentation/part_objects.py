@@ -38,7 +38,8 @@ def part_objects(
     mask = affinities.sample(risen) & (affinities.object > own.least)
     border = borders_of(affinities)
     parts = find_parts(mask, border, own.components)
-    labels = affinities.restore(join_alike_pixels(parts, affinities, own.alike))
+    depth = affinities.sample(np.where(seen.valid, seen.points[..., 2], np.nan))
+    labels = affinities.restore(join_alike_pixels(parts, affinities, depth, own))
     return Parted(
         np.where(risen, labels, 0),
         affinities.restore(border),

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from brrp_cli.config.segmentation import AffinitiesConfig
 from brrp_cli.segmentation.agglomerate import borders_of, join_alike_pixels
 from brrp_cli.segmentation.learned_affinities import Affinities
 from brrp_cli.segmentation.pixel_pairs import OFFSETS, windows
@@ -17,6 +18,12 @@ def told(objects, sure=0.9):
         pixel, partner = windows(offset, SHAPE)
         each[pixel] = np.where(objects[pixel] == objects[partner], sure, 1 - sure)
     return Affinities(same, (objects > 0).astype(np.float32), OFFSETS, SHAPE)
+
+
+def joined(parts, affinities, depth=None):
+    """Labels after those more alike than not were joined; depth is one plane unless given."""
+    depth = np.ones(SHAPE) if depth is None else depth
+    return join_alike_pixels(parts, affinities, depth, AffinitiesConfig(alike=0.5, step=0.08))
 
 
 def stripes(*widths):
@@ -50,15 +57,14 @@ def test_a_border_lies_between_the_pixels_that_differ():
 def test_pieces_of_one_object_are_joined_and_objects_are_not():
     objects = stripes(30, 30)
     parts = stripes(10, 12, 8, 15, 15)
-    joined = join_alike_pixels(parts, told(objects), 0.5)
-    assert np.array_equal(joined, objects)
+    assert np.array_equal(joined(parts, told(objects)), objects)
 
 
 def test_what_something_lies_in_front_of_is_one_by_pixels_that_lie_far_apart():
     parts = stripes(20, 10, 30)
     objects = np.where(parts == 2, 2, 1)
-    joined = join_alike_pixels(parts, told(objects), 0.5)
-    assert joined[0, 0] == joined[0, 50] != joined[0, 25]
+    found = joined(parts, told(objects))
+    assert found[0, 0] == found[0, 50] != found[0, 25]
 
 
 def test_one_wrong_border_changes_little():
@@ -66,12 +72,24 @@ def test_one_wrong_border_changes_little():
     affinities = told(np.ones(SHAPE, np.int64))
     near = [max(offset) == 2 for offset in OFFSETS]
     affinities.same[near, :, 27:33] = 0.0
-    assert len(np.unique(join_alike_pixels(parts, affinities, 0.5))) == 1
+    assert len(np.unique(joined(parts, affinities))) == 1
+
+
+@pytest.mark.parametrize(("metres", "things"), [(0.06, 1), (0.1, 2)])
+def test_what_stands_far_in_front_of_another_thing_is_a_thing_of_its_own(metres, things):
+    parts, one = stripes(30, 30), np.ones(SHAPE, np.int64)
+    depth = np.where(parts == 1, 0.8, 0.8 + metres)
+    assert len(np.unique(joined(parts, told(one), depth))) == things
+
+
+def test_a_step_is_none_where_depth_is_missing_and_parts_beside_it_lie_as_deep():
+    parts, one = stripes(20, 20, 20), np.ones(SHAPE, np.int64)
+    depth = np.where(parts == 2, np.nan, 0.8)
+    assert len(np.unique(joined(parts, told(one), depth))) == 1
 
 
 def test_background_joins_nothing():
     parts = stripes(20, 20, 20)
     parts[parts == 2] = 0
-    joined = join_alike_pixels(parts, told(parts), 0.5)
-    assert np.unique(joined).tolist() == [0, 1, 2]
-    assert np.array_equal(join_alike_pixels(0 * parts, told(parts), 0.5), 0 * parts)
+    assert np.unique(joined(parts, told(parts))).tolist() == [0, 1, 2]
+    assert np.array_equal(joined(0 * parts, told(parts)), 0 * parts)
