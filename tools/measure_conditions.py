@@ -3,8 +3,8 @@
     python tools/measure_conditions.py FRAMES... [--prior PRIOR] [--only half,grey,...]
 
 Every frame (anything that `brrp frame` reads) is changed in each of CONDITIONS: depth with holes,
-coarse, noisy or moved against colour, images of other sizes, grey, on their side. Its own masks are
-not looked at. Counted are
+coarse, noisy, filled or moved against colour; colours in other light, grey, blurred or compressed;
+images of other sizes, on their side, rolled. Its own masks are not looked at. Counted are
 
 same        masks from depth of the frame as it is that one of the changed frame matches, IoU over
             0.75
@@ -22,10 +22,13 @@ import argparse
 import sys
 from collections.abc import Callable
 from dataclasses import dataclass
+from io import BytesIO
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from PIL import Image
 
 # The script also runs from a checkout that is not installed.
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
@@ -89,6 +92,30 @@ def lying(turns: int) -> Condition:
     )
 
 
+def rolled(degrees: float) -> Condition:
+    """A camera that was turned about its line of sight, clockwise; what leaves the image is lost.
+    Focal lengths along rows and columns are taken to be one."""
+
+    def made(frame: Frame) -> Frame:
+        rgb = rotated(frame.rgb, degrees, order=1)
+        depth = rotated(np.where(frame.valid, frame.depth, 0), degrees, order=0)
+        K, middle = frame.K.copy(), (np.array(frame.shape[::-1]) - 1) / 2
+        angle = np.radians(degrees)
+        across, along = np.cos(angle), np.sin(angle)
+        K[:2, 2] = [[across, along], [-along, across]] @ (K[:2, 2] - middle) + middle
+        return make_frame(rgb=rgb.round().astype(np.uint8), depth=depth, K=K)
+
+    return Condition(made, lambda masks: rotated(masks, -degrees, order=0).astype(masks.dtype))
+
+
+def rotated(image: NDArray[Any], degrees: float, order: int) -> NDArray[np.float64]:
+    """(H, W, ...), counter-clockwise about its middle; 0 where nothing was."""
+    from skimage.transform import rotate
+
+    turned_image = rotate(image.astype(np.float64), degrees, order=order, preserve_range=True)
+    return np.asarray(turned_image)
+
+
 def resized(factor: float) -> Condition:
     """An image of `factor` times the size: 0.5 or a whole number."""
 
@@ -139,6 +166,19 @@ def coarse(depth: Depth) -> Depth:
     return found
 
 
+def interpolated(depth: Depth) -> Depth:
+    """Of half the size, enlarged linearly: edges lie between what they divide."""
+    from skimage.transform import resize
+
+    return np.asarray(resize(depth[::2, ::2], depth.shape, order=1, preserve_range=True))
+
+
+def filled(depth: Depth) -> Depth:
+    """With what is on the left of a hole in it, as some cameras' filters fill them."""
+    column = np.where(depth > 0, np.arange(depth.shape[1]), 0)
+    return np.take_along_axis(depth, np.maximum.accumulate(column, axis=1), axis=1)
+
+
 def without_edges(depth: Depth) -> Depth:
     """Without what is four pixels or less from a jump of 2 cm."""
     from scipy.ndimage import maximum_filter, minimum_filter
@@ -152,6 +192,25 @@ def grey(rgb: NDArray[np.uint8]) -> NDArray[np.uint8]:
     return rgb.mean(axis=-1, keepdims=True).repeat(3, axis=-1).astype(np.uint8)
 
 
+def lit(*gains: float) -> Condition:
+    """Red, green and blue so many times as bright, 255 at most."""
+    return with_colour(lambda rgb: np.minimum(rgb * np.array(gains), 255).astype(np.uint8))
+
+
+def blurred(rgb: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """Colours (H, W, 3) of a camera that moved sideways by nine pixels."""
+    from scipy.ndimage import uniform_filter1d
+
+    return uniform_filter1d(rgb.astype(np.float64), 9, axis=1).round().astype(np.uint8)
+
+
+def compressed(rgb: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """Colours (H, W, 3) after JPEG of quality 50."""
+    file = BytesIO()
+    Image.fromarray(rgb).save(file, "JPEG", quality=50)
+    return np.asarray(Image.open(file))
+
+
 CONDITIONS = {
     "third_rows": kept_where(every(3, (0,))),
     "quarter": kept_where(every(2, (0, 1))),
@@ -161,13 +220,22 @@ CONDITIONS = {
     "steps_8_mm": with_depth(lambda depth: np.round(depth / 0.008) * 0.008),
     "noise_6_mm": with_depth(noisy),
     "no_edges": with_depth(without_edges),
+    "interpolated": with_depth(interpolated),
+    "filled": with_depth(filled),
     "moved": with_colour(lambda rgb: np.roll(rgb, (2, 4), (0, 1))),
     "grey": with_colour(grey),
     "dark": with_colour(lambda rgb: (255 * (rgb / 255) ** 1.6).astype(np.uint8)),
+    "bright": lit(1.8, 1.8, 1.8),
+    "warm": lit(1.2, 1.0, 0.7),
+    "cool": lit(0.75, 1.0, 1.25),
+    "blurred": with_colour(blurred),
+    "jpeg_50": with_colour(compressed),
     "half": resized(0.5),
     "double": resized(2),
     "on_its_side": lying(1),
     "upside_down": lying(2),
+    "rolled_20": rolled(20),
+    "rolled_45": rolled(45),
 }
 
 

@@ -36,6 +36,16 @@ def test_a_changed_frame_shows_the_same_things_at_the_same_pixels(frame, name):
     assert back.shape == frame.shape
 
 
+@pytest.mark.parametrize("name", ["rolled_20", "rolled_45"])
+def test_what_a_rolled_camera_sees_is_as_far_from_it(scene, name):
+    K = scene.K + np.array([[0, 0, 30], [0, 0, -20], [0, 0, 0]])
+    frame, condition = make_frame(rgb=scene.rgb, depth=scene.depth, K=K), CONDITIONS[name]
+    far = np.linalg.norm(frame.points, axis=-1)
+    back = condition.back(np.nan_to_num(np.linalg.norm(condition.made(frame).points, axis=-1)))
+    seen = (back > 0) & np.isfinite(far)
+    assert np.median(np.abs(back - far)[seen]) < 0.001
+
+
 def test_masks_match_one_to_one():
     masks = np.zeros((20, 40), np.int64)
     masks[:10, :10], masks[:10, 20:30] = 1, 2
