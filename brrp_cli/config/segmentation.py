@@ -79,7 +79,7 @@ class AffinitiesConfig:
     colour: float = share(0.5)
     least: float = share(0.1)
     alike: float = share(0.3)
-    step: float = 0.08
+    step: float = 0.12
     components: ComponentsConfig = field(default_factory=lambda: ComponentsConfig(least_core=32))
     margin: int = 64
 
