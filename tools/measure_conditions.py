@@ -112,8 +112,8 @@ def rotated(image: NDArray[Any], degrees: float, order: int) -> NDArray[np.float
     """(H, W, ...), counter-clockwise about its middle; 0 where nothing was."""
     from skimage.transform import rotate
 
-    turned_image = rotate(image.astype(np.float64), degrees, order=order, preserve_range=True)
-    return np.asarray(turned_image)
+    floats = image.astype(np.float64)
+    return np.asarray(rotate(floats, degrees, order=order, preserve_range=True))
 
 
 def resized(factor: float) -> Condition:

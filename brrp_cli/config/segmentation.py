@@ -71,7 +71,7 @@ class AffinitiesConfig:
     least : that a pixel shows an object, or it is depth that bled
     alike : mean affinity of the pixels of two parts from which on they are one object: training
         counts pairs of two objects four times, so that less than a half is even
-    step : metres between the depths of two pixels from which on they are not alike
+    step : metres between the depths of two pixels; with more they are not alike
     components : the parts that are joined, in pixels of the network's image
     margin : pixels of that image beside what rises that the network sees, too
     """

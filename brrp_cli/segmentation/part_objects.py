@@ -38,7 +38,7 @@ def part_objects(
     mask = affinities.sample(risen) & (affinities.object > own.least)
     border = borders_of(affinities)
     parts = find_parts(mask, border, own.components)
-    depth = affinities.sample(np.where(seen.valid, seen.points[..., 2], np.nan))
+    depth = affinities.sample(seen.depth)
     labels = affinities.restore(join_alike_pixels(parts, affinities, depth, own))
     return Parted(
         np.where(risen, labels, 0),
