@@ -140,6 +140,40 @@ class TurnConfig:
 
 
 @dataclass(frozen=True)
+class PrintConfig:
+    """How a placed object is turned as its print lies in the image (registration/by_print.py).
+
+    Colours are means over cells of `cell` metres, of at most `vertices` vertices, of which a share
+    `independent` counts as votes, with a correlation of `most_alike` at most. A direction is open
+    where depth leaves a standard deviation of `open` metres on the surface or more; `turn` and
+    `shift`, radians and metres, are the deviations before anything was seen. Steps along them
+    begin with `first_step` metres and end under `last_step`. Of the turns that bring the object
+    onto itself (`TurnConfig`) those `tried` are looked at of which the print says most, `behind`
+    nats less than of the first at most, first those that are `apart` radians from all better ones;
+    of those that gain `least` nats by what is printed one is taken that gains `gain` nats by all.
+    Mean distances from the surface are known to `exact` metres, however many points there are.
+    asked : whether any of this is done
+    """
+
+    asked: bool = True
+    cell: float = 0.005
+    vertices: int = 4000
+    independent: float = share(0.12)
+    most_alike: float = share(0.999)
+    open: float = 0.0005
+    turn: float = 0.3
+    shift: float = 0.003
+    first_step: float = 0.004
+    last_step: float = 0.0002
+    tried: int = between(3, 0, 1000)
+    apart: float = 0.4
+    behind: float = between(3.0, 0.0, 1000.0)
+    least: float = between(0.5, 0.0, 1000.0)
+    gain: float = between(1.0, 0.0, 1000.0)
+    exact: float = 0.00001
+
+
+@dataclass(frozen=True)
 class SearchConfig:
     """Hypotheses about one stored object's pose.
 
@@ -217,6 +251,7 @@ class SearchConfig:
     alignment_score: VerificationConfig = field(default_factory=VerificationConfig)
     colour: ColourConfig = field(default_factory=ColourConfig)
     about_itself: TurnConfig = field(default_factory=TurnConfig)
+    by_print: PrintConfig = field(default_factory=PrintConfig)
 
 
 @dataclass(frozen=True)

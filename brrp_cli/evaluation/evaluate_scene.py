@@ -12,6 +12,7 @@ import numpy as np
 from brrp_cli.errors import BrrpError
 from brrp_cli.evaluation.memory import peak_megabytes, reset_peak
 from brrp_cli.evaluation.perturb import shift_masks, with_noise
+from brrp_cli.evaluation.pose_error import TruePose, pose_error, true_pose
 from brrp_cli.evaluation.recognition import half_extent, recognition
 from brrp_cli.evaluation.rows import STAGES, Row, RowLog, variant_columns
 from brrp_cli.evaluation.score_object import placement_error, score_probabilities, score_shape
@@ -69,11 +70,12 @@ def evaluate_scene(plan: Plan, scene: Scene, variants: list[Variant], log: Path)
 
 class Truth(NamedTuple):
     """One true object: occupancy on grids and its surface, camera frame; `half_extent`: half the
-    longest side of its box along its own axes, metres."""
+    longest side of its box along its own axes, metres; where its mesh lies."""
 
     shape: TrueShape
     surface: TrueSurface
     half_extent: float
+    pose: TruePose
 
 
 def true_objects(plan: Plan, scene: Scene, clean: Frame) -> dict[int, Truth | BrrpError]:
@@ -90,7 +92,8 @@ def true_objects(plan: Plan, scene: Scene, clean: Frame) -> dict[int, Truth | Br
             shape = true_shape(meshes, clean, rng)
             surface = true_surface(shape.mesh.measured, clean, object_id, scene.name, plan.seed)
             size = half_extent(meshes.exact.vertices, true_object.T_world_object)
-            truths[object_id] = Truth(shape, surface, size)
+            pose = true_pose(true_object, meshes.exact.vertices, clean.T_world_cam)
+            truths[object_id] = Truth(shape, surface, size, pose)
         except BrrpError as error:
             truths[object_id] = error
     return truths
@@ -225,6 +228,8 @@ def _row(
         best = max(placed, key=lambda each: each.weight or 0.0)
         stored = _prior(plan.prior).load(best.name)
         row["placement_error"] = placement_error(best, stored, truth.shape)
+        if row.get("recognised"):
+            row |= pose_error(best, stored, truth.pose)
     return row
 
 

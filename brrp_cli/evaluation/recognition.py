@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from brrp_cli.evaluation.pose_error import RIGHT
 from brrp_cli.reconstruction import ObjectReconstruction, Retrieved
 
 Row = dict[str, Any]
@@ -18,6 +19,8 @@ RECOGNITION_FIGURES = (
     "weight_true_clear",
     "other_size",
     "placement_recognised",
+    "pose_recognised",
+    "pose_right",
     "stranger_taken",
 )
 CLEAR_PIXELS = 1000  # visible; fewer may be too few to tell
@@ -60,7 +63,9 @@ def with_recognition(row: Row) -> Row:
     """With `RECOGNITION_FIGURES`, each where it has a meaning: of objects of the prior with at
     least 1,000 visible pixels, whether they are recognised and the weight of the true object; of
     recognised ones, whether they are placed at another size, and the distance of the placed model
-    to the true surface; of others, whether more than half of the weight is on one stored object."""
+    to the true surface, that of its points from where they truly are, and whether that is less than
+    a tenth of its diameter; of others, whether more than half of the weight is on one stored
+    object."""
     more: Row = {}
     recognised = row.get("recognised")
     if recognised is not None and row["visible_pixels"] >= CLEAR_PIXELS:
@@ -69,9 +74,17 @@ def with_recognition(row: Row) -> Row:
         # Not at its own size where it has none, too.
         own = row["size_factor"] is not None and abs(row["size_factor"] - 1) <= OTHER_SIZE
         more |= {"other_size": not own, "placement_recognised": row.get("placement_error")}
+        more |= _pose_figures(row)
     if recognised is None and row.get("weight_best") is not None:
         more["stranger_taken"] = row["weight_best"] > TAKEN
     return {**row, **{name: value for name, value in more.items() if value is not None}}
+
+
+def _pose_figures(row: Row) -> Row:
+    error = row.get("pose_error")
+    if error is None:
+        return {}
+    return {"pose_recognised": error, "pose_right": error < RIGHT * row["diameter"]}
 
 
 def _placed_half_extent(placed: Retrieved) -> float:

@@ -17,6 +17,7 @@ from typing import Any, BinaryIO
 
 from filelock import FileLock
 
+from brrp_cli.evaluation.pose_error import POSE
 from brrp_cli.evaluation.recognition import RECOGNITION
 from brrp_cli.evaluation.score_object import PROBABILITY_METRICS, REGIONS, SHAPE_METRICS
 from brrp_cli.evaluation.variants import Variant
@@ -48,6 +49,7 @@ RESULT = (
     "placed",
     "placement_error",
     *RECOGNITION,
+    *POSE,
 )
 STAGES = ("observation", "retrieval", "registration", "inference", "surface")
 COST = (*(f"seconds_{stage}" for stage in STAGES), "seconds_total", "peak_memory_mb")

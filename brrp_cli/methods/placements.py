@@ -15,8 +15,10 @@ from brrp_cli.methods.earlier_views import EarlierViews
 from brrp_cli.methods.scene import SeenScene
 from brrp_cli.observation.ray_samples import ObjectObservation
 from brrp_cli.reconstruction import Retrieved
+from brrp_cli.registration.by_print import turned_by_print
 from brrp_cli.registration.likelihood import SeenPixels, evidence, log_likelihood, see
 from brrp_cli.registration.model import Model, search_model
+from brrp_cli.registration.pose_covariance import pose_covariance
 from brrp_cli.registration.pose_search import Hypothesis, search
 from brrp_cli.registration.refined import refined
 from brrp_cli.registration.scale_scan import observed_cloud
@@ -135,6 +137,7 @@ class Placer:
         for i in kept.tolist():
             placed[i] = self._nearer(placed[i])
             if not self._views:
+                placed[i] = self._turned_by_print(placed[i])
                 best = turned(
                     placed[i],
                     self._verifier,
@@ -260,11 +263,38 @@ class Placer:
             return each
         return replace(nearer, alignment_score=each.alignment_score + float(after - before))
 
-    def _log_likelihood(self, model: Model, T_cam_model: Array) -> float:
-        """Of a placement, against that it is none of the stored objects, nats."""
+    def _turned_by_print(self, each: Hypothesis) -> Hypothesis:
+        search, sensor, verifier = self._config.search, self._config.sensor, self._verifier
+        free = replace(sensor, pose_turn=search.by_print.turn, pose_shift=search.by_print.shift)
+
+        def covariance(T_cam_model: Array) -> Array:
+            return pose_covariance(
+                T_cam_model,
+                each.model,
+                verifier.points,
+                self._scene.image.wave,
+                free,
+                mask=verifier.mask,
+            )
+
+        return turned_by_print(
+            each,
+            verifier,
+            sensor.patch,
+            search,
+            partial(self._log_likelihood, each.model, asks_colour=False),
+            self._nearer,
+            covariance,
+        )
+
+    def _log_likelihood(
+        self, model: Model, T_cam_model: Array, *, asks_colour: bool = True
+    ) -> float:
+        """Of a placement, against that it is none of the stored objects, nats; with its print or
+        without."""
         likelihood = self._config.likelihood
         found = evidence(T_cam_model, model, self.seen, likelihood, self._config.search.colour)
-        return log_likelihood(found, likelihood)
+        return log_likelihood(found if asks_colour else replace(found, colour=0.0), likelihood)
 
 
 def _retrieved(

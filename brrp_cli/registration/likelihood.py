@@ -37,8 +37,8 @@ from brrp_cli.frames.frame import BACKGROUND, Frame
 from brrp_cli.geometry import bounds, grid_nodes, transform_points
 from brrp_cli.observation.pixel_noise import PixelNoise
 from brrp_cli.observation.support_plane import Plane
-from brrp_cli.registration.colour_pose import print_agreement
 from brrp_cli.registration.model import Model
+from brrp_cli.registration.print_agreement import print_agreement
 from brrp_cli.registration.surroundings import Surroundings, like_surroundings, surroundings
 
 Array = NDArray[np.float64]

@@ -17,18 +17,19 @@ from scipy.spatial.transform import Rotation
 from brrp_cli.config import FeatureConfig, SearchConfig
 from brrp_cli.geometry import as_transforms, transform_points
 from brrp_cli.registration.begin import best_brought_nearer, best_of, brought_nearer, coarse_score
-from brrp_cli.registration.colour_pose import (
-    about_main_axes,
-    best_and_different,
-    print_agreement,
-    turns_about_itself,
-)
 from brrp_cli.registration.initial_poses import feature_matched_poses
 from brrp_cli.registration.leaning_poses import resting_and_leaning
 from brrp_cli.registration.model import Model
+from brrp_cli.registration.print_agreement import print_agreement
 from brrp_cli.registration.scale_scan import ObservedCloud
 from brrp_cli.registration.sdf_refinement import refine_to_sdf
 from brrp_cli.registration.transform_loops import inverses
+from brrp_cli.registration.turns import (
+    about_main_axes,
+    best_and_different,
+    turns_about_itself,
+    without_same,
+)
 from brrp_cli.registration.verification import Verifier
 
 Array = NDArray[np.float64]
@@ -200,23 +201,6 @@ def different(T_cam_model: Array, config: SearchConfig) -> Array:
     """Placements (B, 4, 4), best first, of one size, without those that are all but a better one:
     more steps would bring both to the same place."""
     return without_same(T_cam_model, config.same_turn, config.same_shift)
-
-
-def without_same(T: Array, turn: float, shift: float) -> Array:
-    """Placements (B, 4, 4), best first, of one size, without those that are turned from a better
-    one by less than `turn`, radians, and shifted by less than `shift`, metres."""
-    if not len(T):
-        return T
-    R, t = T[:, :3, :3].reshape(-1, 9), T[:, :3, 3]
-    # The trace of the turn between two is 1 + 2 cos of its angle.
-    trace = R @ R.T / (R[0] @ R[0] / 3)
-    apart = np.linalg.norm(t[:, None] - t, axis=2)
-    same = (trace > 1 + 2 * np.cos(turn)) & (apart < shift)
-    kept = np.ones(len(same), dtype=np.bool_)
-    for row in range(len(same)):
-        if kept[row]:
-            kept[row + 1 :] &= ~same[row, row + 1 :]
-    return np.asarray(T[kept])
 
 
 def _distinct(found: list[Hypothesis], config: SearchConfig) -> list[Hypothesis]:

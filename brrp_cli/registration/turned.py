@@ -10,27 +10,19 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import cache
-from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 from brrp_cli.config import SearchConfig, TurnConfig
-from brrp_cli.geometry import as_transforms, cells_of, transform_points
-from brrp_cli.prior.shape import StoredShape
-from brrp_cli.registration.colour_pose import (
-    about_main_axes,
-    best_and_different,
-    print_agreement,
-    turns_about_itself,
-)
-from brrp_cli.registration.pose_search import Hypothesis, different, without_same
+from brrp_cli.registration.onto_itself import turned_by, turns_onto_itself
+from brrp_cli.registration.point_distances import distances, worse_than
+from brrp_cli.registration.pose_search import Hypothesis, different
+from brrp_cli.registration.print_agreement import print_agreement
 from brrp_cli.registration.sdf_refinement import refine_to_sdf
 from brrp_cli.registration.transform_loops import inverses
+from brrp_cli.registration.turns import best_and_different
 from brrp_cli.registration.verification import Verifier
-from brrp_cli.seeds import child_rng
 
 Array = NDArray[np.float64]
 
@@ -59,12 +51,12 @@ def turned(
     refine : brings a placement as near as `placed` came, which takes its time
     """
     turn = config.about_itself
-    start = _nearly_itself(placed, turn)
+    start = turns_onto_itself(placed.model, turn)
     if not len(start):
         return Turned(placed, np.empty((0, 4, 4)))
     points = verifier.points[: turn.points]
     T = placed.T_cam_model @ start
-    coarse = np.minimum(_distances(T, placed, points[: turn.coarse_points]), turn.far).mean(axis=1)
+    coarse = np.minimum(distances(T, placed, points[: turn.coarse_points]), turn.far).mean(axis=1)
     T = T[best_and_different(start[:, :3, :3], -coarse, turn.count, turn.apart)]
     refined = refine_to_sdf(
         inverses(T),
@@ -74,19 +66,19 @@ def turned(
         config.middle_steps,
     )
     T = inverses(refined)
-    near = np.minimum(_distances(T, placed, points[: config.fine_points]), turn.far).mean(axis=1)
+    near = np.minimum(distances(T, placed, points[: config.fine_points]), turn.far).mean(axis=1)
     near_enough = np.argsort(near, kind="stable")[: turn.judged]
     T = different(T[near_enough[near[near_enough] <= near.min() + turn.worse]], config)
     T = np.concatenate([placed.T_cam_model[None], T])
     T = T[_as_much_explained(T, placed, verifier, config)]
     if len(T) == 1:
         return Turned(placed, np.empty((0, 4, 4)))
-    exact = np.minimum(_distances(T, placed, points, exact=True), turn.far)
-    worse, doubt = _worse_than(0, exact, points, patch)
+    exact = np.minimum(distances(T, placed, points, exact=True), turn.far)
+    worse, doubt = worse_than(0, exact, points, patch)
     better = worse + turn.gain * doubt
     first = int(np.argmin(np.where(_as_much_alike(T, placed, verifier, config), better, np.inf)))
-    worse, doubt = _worse_than(first, exact, points, patch)
-    undecided = (worse <= turn.undecided * doubt) & (_angles(T, T[first]) >= turn.apart)
+    worse, doubt = worse_than(first, exact, points, patch)
+    undecided = (worse <= turn.undecided * doubt) & (turned_by(T, T[first]) >= turn.apart)
     # As near as `placed`, which those that are refined would beat unfairly otherwise.
     best = placed if first == 0 else refine(replace(placed, T_cam_model=T[first]))
     if not undecided.any():
@@ -118,77 +110,6 @@ def _as_probable(
             nearer = refine(found[row][1])
             found[row] = judge(nearer.T_cam_model), nearer
     return [each for each in found if each[0] >= least]
-
-
-# Of stored shapes, by what they were compared with: it takes as long as a step of the search.
-_TURNS: WeakKeyDictionary[StoredShape, tuple[TurnConfig, Array]] = WeakKeyDictionary()
-
-
-def _nearly_itself(placed: Hypothesis, config: TurnConfig) -> Array:
-    """(K, 4, 4) motions of the model, turns by `config.apart` at least, that bring its surface back
-    to within `config.itself` of itself, on average. Of an object that is held it is found once."""
-    model = placed.model
-    known = _TURNS.get(model.stored.shape)
-    if known is not None and known[0] == config:
-        return known[1]
-    surface = model.surface[: config.surface_points]
-    start = np.concatenate(
-        [
-            as_transforms(_every_turn(config)),
-            about_main_axes(model.surface, config.turns, config.main_axes),
-        ]
-    )
-    # Scanned things do not lie quite along the axes of their boxes.
-    every = refine_to_sdf(start, surface, model, config.onto_itself, config.onto_itself_steps)
-    moved = np.einsum("kij,nj->kni", every[:, :3, :3], surface) + every[:, None, :3, 3]
-    off = np.abs(model.signed_distance(moved.reshape(-1, 3))).reshape(len(every), -1).mean(axis=1)
-    good = (off < config.itself) & (_angles(every, np.eye(4)) >= config.apart)
-    found = every[good][np.argsort(off[good], kind="stable")]
-    found = without_same(found, config.same_turn, config.same_shift)
-    _TURNS[model.stored.shape] = config, found
-    return found
-
-
-@cache
-def _every_turn(config: TurnConfig) -> Array:
-    """(K, 3, 3): about the axes of the box, and any."""
-    drawn = Rotation.random(config.any_turns, random_state=child_rng(0, "turned")).as_matrix()
-    every = np.concatenate([turns_about_itself(config.turns), drawn])
-    return np.asarray(every[_angles(every, np.eye(3)) >= config.apart])
-
-
-def _angles(T: Array, other: Array) -> Array:
-    """(K,) radians between rotations or similarities of one size (K, ...) and another."""
-    R, S = T[:, :3, :3], other[:3, :3]
-    square = (S**2).sum() / 3
-    cosine = (np.einsum("kij,ij->k", R, S) / square - 1) / 2
-    return np.asarray(np.arccos(np.clip(cosine, -1, 1)))
-
-
-def _distances(
-    T_cam_model: Array, placed: Hypothesis, points: Array, *, exact: bool = False
-) -> Array:
-    """(K, n) metres of points (n, 3), camera frame, from the surface under each placement; by the
-    coarse field, or exact."""
-    stored = placed.model.stored
-    T_model_cam = inverses(T_cam_model)
-    moved = np.concatenate([transform_points(each, points) for each in T_model_cam])
-    if exact:
-        distance = stored.shape.distance(moved / stored.half_extent) * stored.half_extent
-    else:
-        distance = np.abs(placed.model.signed_distance(moved))
-    return np.asarray((distance * placed.scale).reshape(len(T_cam_model), -1))
-
-
-def _worse_than(first: int, distances: Array, points: Array, patch: float) -> tuple[Array, Array]:
-    """Mean (K,), metres, by which points lie further from the surface under each placement than
-    under one of them, and its standard error over patches: neighbouring pixels err together."""
-    difference = distances - distances[first]
-    cell = cells_of(points, patch)
-    mean = difference.mean(axis=1)
-    residual = difference - mean[:, None]
-    sums = np.stack([np.bincount(cell, weights=each) for each in residual])
-    return mean, np.sqrt((sums**2).sum(axis=1)) / len(points)
 
 
 def _as_much_explained(

@@ -84,3 +84,10 @@ def test_each_figure_is_over_the_objects_that_it_asks_for():
     assert figures(weight_best=0.51) == {"stranger_taken": True}
     assert figures(weight_best=0.5, visible_pixels=20) == {"stranger_taken": False}
     assert figures() == {}
+
+
+def test_a_pose_is_right_within_a_tenth_of_the_diameter():
+    known = {"recognised": True, "size_factor": 1.0, "visible_pixels": 20, "diameter": 0.2}
+    own = {"other_size": False, "pose_recognised": 0.019, "pose_right": True}
+    assert figures(**known, pose_error=0.019) == own
+    assert figures(**known, pose_error=0.021)["pose_right"] is False

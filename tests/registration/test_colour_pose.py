@@ -11,14 +11,10 @@ from table_scene import MESHES, TABLE, in_camera, photograph, placed, stored
 from brrp_cli.config import ColourConfig, SearchConfig
 from brrp_cli.config.registration import MainAxesConfig
 from brrp_cli.geometry import similarity, transform_points
-from brrp_cli.registration.colour_pose import (
-    about_main_axes,
-    best_and_different,
-    print_agreement,
-    turns_about_itself,
-)
 from brrp_cli.registration.model import search_model
 from brrp_cli.registration.pose_search import Hypothesis, by_colour
+from brrp_cli.registration.print_agreement import print_agreement
+from brrp_cli.registration.turns import about_main_axes, best_and_different, turns_about_itself
 from brrp_cli.registration.verification import Verifier
 
 CONFIG = ColourConfig()

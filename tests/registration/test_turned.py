@@ -13,8 +13,9 @@ from brrp_cli.geometry import similarity
 from brrp_cli.prior.build.find_meshes import MeshSource
 from brrp_cli.prior.build.make_object import make_object
 from brrp_cli.registration.model import search_model
+from brrp_cli.registration.onto_itself import turns_onto_itself
 from brrp_cli.registration.pose_search import Hypothesis
-from brrp_cli.registration.turned import _nearly_itself, turned
+from brrp_cli.registration.turned import turned
 from brrp_cli.registration.verification import Verifier
 from brrp_cli.shapes import solids
 
@@ -86,7 +87,7 @@ def test_a_thing_that_was_scanned_askew_is_turned_end_over_end_too(tmp_path):
     box.export(tmp_path / "askew.ply")
     source = MeshSource("askew", tmp_path / "askew.ply", "askew.ply")
     model = search_model(make_object(source, PARAMETERS))
-    found = _nearly_itself(Hypothesis(model, np.eye(4), 1.0, 0.9), CONFIG.about_itself)
+    found = turns_onto_itself(model, CONFIG.about_itself)
     halves = Rotation.from_matrix(found[:, :3, :3])
     halves = halves[np.abs(halves.magnitude() - np.pi) < 0.05]
     axes = np.abs(halves.as_rotvec() @ askew) / np.pi

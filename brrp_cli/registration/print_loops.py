@@ -1,0 +1,124 @@
+"""What is printed on a placed object, held against the image, as machine code. See `compiled`."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brrp_cli.compiled import compiled
+
+Array = NDArray[np.float64]
+
+# Columns of what is found: the correlation, the standard deviations of the stored colours and of
+# the image's, and how many cells of the surface the camera sees.
+CORRELATION, STORED, IMAGE, CELLS = 0, 1, 2, 3
+# Of a box.
+_SIDES = 6
+
+
+@compiled
+def agreements(
+    T_cam_model: Array,
+    points: Array,
+    normals: Array,
+    offsets: Array,
+    colours: Array,
+    cell: NDArray[np.int64],
+    side: NDArray[np.int64],
+    rgb: NDArray[np.uint8],
+    depth: NDArray[np.floating],
+    lost: NDArray[np.bool_],
+    K: Array,
+    opponent: Array,
+    near: float,
+    least: int,
+    channels: int,
+) -> Array:
+    """(B, 4) of placements (B, 4, 4): see the columns above; 0 where fewer than `least` points are
+    seen. Colours are means over cells, each channel about its own mean, and brightness about that
+    of each side, of what is seen.
+
+    points, normals : (n, 3) metres, model's axes; offsets : (n,) of the planes through them, seen
+    from where the camera is beyond; colours : (n, 3) stored, along `opponent` (3, 3), whose first
+    row is brightness; cell, side : (n,) numbers, from 0 on, of the cell of the surface and of the
+    side of the box
+    rgb, depth, lost : (H, W, 3), (H, W) metres, (H, W): a point is seen where the measured depth is
+    within `near` metres of it, or where that is lost
+    channels : of the colours that are compared, the first ones
+    """
+    height, width = depth.shape
+    found = np.zeros((len(T_cam_model), 4))
+    seen, pixel = np.empty(len(points), np.int64), np.empty((len(points), 3))
+    count = np.zeros(cell.max() + 1)
+    sums = np.zeros((2, len(count), 3))
+    eye = np.empty(3)
+    for b in range(len(T_cam_model)):
+        T = T_cam_model[b]
+        square = T[0, 0] ** 2 + T[1, 0] ** 2 + T[2, 0] ** 2
+        for i in range(3):
+            eye[i] = -(T[0, i] * T[0, 3] + T[1, i] * T[1, 3] + T[2, i] * T[2, 3]) / square
+        total = 0
+        on_side, bright = np.zeros(_SIDES), np.zeros((2, _SIDES))
+        for n in range(len(points)):
+            p, a = points[n], normals[n]
+            if a[0] * eye[0] + a[1] * eye[1] + a[2] * eye[2] <= offsets[n]:
+                continue
+            z = T[2, 0] * p[0] + T[2, 1] * p[1] + T[2, 2] * p[2] + T[2, 3]
+            if z <= 0:
+                continue
+            x = T[0, 0] * p[0] + T[0, 1] * p[1] + T[0, 2] * p[2] + T[0, 3]
+            y = T[1, 0] * p[0] + T[1, 1] * p[1] + T[1, 2] * p[2] + T[1, 3]
+            u, v = np.rint(x / z * K[0, 0] + K[0, 2]), np.rint(y / z * K[1, 1] + K[1, 2])
+            if not (0 <= u < width and 0 <= v < height):
+                continue
+            row, column = int(v), int(u)
+            if not (abs(depth[row, column] - z) < near or lost[row, column]):
+                continue
+            for i in range(3):
+                pixel[total, i] = 0.0
+                for j in range(3):
+                    pixel[total, i] += opponent[i, j] * rgb[row, column, j]
+            seen[total] = n
+            on_side[side[n]] += 1
+            bright[0, side[n]] += colours[n, 0]
+            bright[1, side[n]] += pixel[total, 0]
+            total += 1
+        if total < least:
+            continue
+        for s in range(_SIDES):
+            for k in range(2):
+                bright[k, s] /= max(on_side[s], 1.0)
+        count[:] = 0
+        sums[:] = 0
+        mean = np.zeros((2, 3))
+        for t in range(total):
+            n = seen[t]
+            count[cell[n]] += 1
+            for i in range(channels):
+                one, other = colours[n, i], pixel[t, i]
+                if i == 0:
+                    one -= bright[0, side[n]]
+                    other -= bright[1, side[n]]
+                sums[0, cell[n], i] += one
+                sums[1, cell[n], i] += other
+                mean[0, i] += one / total
+                mean[1, i] += other / total
+        both, one_square, other_square, cells = 0.0, 0.0, 0.0, 0
+        for c in range(len(count)):
+            if count[c] == 0:
+                continue
+            cells += 1
+            for i in range(channels):
+                one = sums[0, c, i] / count[c] - mean[0, i]
+                other = sums[1, c, i] / count[c] - mean[1, i]
+                both += count[c] * one * other
+                one_square += count[c] * one * one
+                other_square += count[c] * other * other
+        spread = math.sqrt(one_square * other_square)
+        found[b, 0] = both / spread if spread > 0 else 0.0
+        found[b, 1] = math.sqrt(one_square / (3 * total))
+        found[b, 2] = math.sqrt(other_square / (3 * total))
+        found[b, 3] = cells
+    return found
