@@ -129,6 +129,8 @@ class Retrieved:
     inliers, fitness : of the paper's registration: pairs, and their share of the stored cloud
     alignment_score : what the frame says for the best placement, 1 at best; weight : of the object
     in the posterior; both None where placements are not verified.
+    alike : T_cam_mesh (4, 4) of other placements, turned about itself, that the frame does not tell
+    apart from that one
     """
 
     name: str
@@ -140,6 +142,7 @@ class Retrieved:
     fitness: float = 0.0
     alignment_score: float | None = None
     weight: float | None = None
+    alike: tuple[NDArray[np.float64], ...] = ()
 
     def __repr__(self) -> str:
         """Name and numbers, without the poses."""

@@ -108,7 +108,8 @@ class TurnConfig:
     observed points, first those that are `apart` radians from all better ones, are refined, and the
     best `judged` held against `points` observed ones, without those whose mean distance on the
     coarse field is longer than the best one's by `worse` metres; distances beyond `far` metres
-    count as that. One takes the place of the first if it is better by `gain` standard errors. Those
+    count as that. Mean distances are known to `exact` metres, however many points there are. One
+    takes the place of the first if it is better by `gain` standard errors. Those
     that are worse by no more than `undecided` standard errors, in alignment score by no more than
     `alike`, and in the likelihood of the frame by no more than `nats`, are as probable; of those
     that are worse by `refined_nats` more at most, the best `refined` are refined first, as the
@@ -130,6 +131,7 @@ class TurnConfig:
     coarse_points: int = 300
     points: int = 2000
     far: float = 0.005
+    exact: float = 0.00001
     gain: float = 2.0
     undecided: float = 3.0
     nats: float = 2.0
@@ -151,7 +153,6 @@ class PrintConfig:
     onto itself (`TurnConfig`) those `tried` are looked at of which the print says most, `behind`
     nats less than of the first at most, first those that are `apart` radians from all better ones;
     of those that gain `least` nats by what is printed one is taken that gains `gain` nats by all.
-    Mean distances from the surface are known to `exact` metres, however many points there are.
     asked : whether any of this is done
     """
 
@@ -170,7 +171,6 @@ class PrintConfig:
     behind: float = between(3.0, 0.0, 1000.0)
     least: float = between(0.5, 0.0, 1000.0)
     gain: float = between(1.0, 0.0, 1000.0)
-    exact: float = 0.00001
 
 
 @dataclass(frozen=True)

@@ -19,7 +19,7 @@ from brrp_cli.reconstruction import Retrieved
 Array = NDArray[np.float64]
 Row = dict[str, Any]
 
-POSE = ("pose_error", "turn_error", "diameter")
+POSE = ("pose_error", "turn_error", "alike", "least_pose_error", "diameter")
 RIGHT = 0.1  # of the diameter, below which a pose is usually counted as right
 _SAME_BOX = 0.01  # of the half extent, by which the boxes of one mesh may differ
 
@@ -43,8 +43,9 @@ def true_pose(true_object: TrueObject, vertices: Array, T_world_cam: Array) -> T
 
 def pose_error(placed: Retrieved, stored: PriorObject, truth: TruePose) -> Row:
     """`POSE` of a recognised object: the mean distance, metres, of points of its mesh from where
-    they truly are; the angle, degrees, by which it is turned from there; the largest distance,
-    metres, between any two points of the mesh. Empty where the true mesh has another box than the
+    they truly are; the angle, degrees, by which it is turned from there; how many other poses the
+    frame does not tell apart from that one, and the least such distance of all of them; the largest
+    distance, metres, between any two points of the mesh. Empty where the true mesh has another box than the
     stored one: its coordinates are others, too."""
     assert placed.T_cam_object is not None
     vertices = stored.shape.vertices.astype(np.float64)
@@ -53,11 +54,20 @@ def pose_error(placed: Retrieved, stored: PriorObject, truth: TruePose) -> Row:
     if np.abs(box - truth.box).max() > _SAME_BOX * stored.half_extent:
         return {}
     surface = stored.surface.astype(np.float64)
-    here = transform_points(placed.T_cam_object, surface)
-    there = transform_points(truth.T_cam_mesh, stored.center + stored.half_extent * surface)
+    points = stored.center + stored.half_extent * surface
+    there = transform_points(truth.T_cam_mesh, points)
+
+    def off(here: Array) -> float:
+        return float(np.linalg.norm(here - there, axis=1).mean())
+
+    error = off(transform_points(placed.T_cam_object, surface))
+    size = 1.0 if placed.size_factor is None else placed.size_factor
+    others = [off(transform_points(T_cam_mesh, size * points)) for T_cam_mesh in placed.alike]
     return {
-        "pose_error": float(np.linalg.norm(here - there, axis=1).mean()),
+        "pose_error": error,
         "turn_error": _turned(placed.T_cam_object, truth.T_cam_mesh),
+        "alike": len(others),
+        "least_pose_error": min([error, *others]),
         "diameter": _diameter(vertices) * stored.half_extent,
     }
 

@@ -21,6 +21,7 @@ RECOGNITION_FIGURES = (
     "placement_recognised",
     "pose_recognised",
     "pose_right",
+    "pose_told",
     "stranger_taken",
 )
 CLEAR_PIXELS = 1000  # visible; fewer may be too few to tell
@@ -63,8 +64,8 @@ def with_recognition(row: Row) -> Row:
     """With `RECOGNITION_FIGURES`, each where it has a meaning: of objects of the prior with at
     least 1,000 visible pixels, whether they are recognised and the weight of the true object; of
     recognised ones, whether they are placed at another size, and the distance of the placed model
-    to the true surface, that of its points from where they truly are, and whether that is less than
-    a tenth of its diameter; of others, whether more than half of the weight is on one stored
+    to the true surface, that of its points from where they truly are, whether that is less than a
+    tenth of its diameter, and whether it is for any of the poses that are alike; of others, whether more than half of the weight is on one stored
     object."""
     more: Row = {}
     recognised = row.get("recognised")
@@ -84,7 +85,9 @@ def _pose_figures(row: Row) -> Row:
     error = row.get("pose_error")
     if error is None:
         return {}
-    return {"pose_recognised": error, "pose_right": error < RIGHT * row["diameter"]}
+    near = RIGHT * row["diameter"]
+    told = row["least_pose_error"] < near
+    return {"pose_recognised": error, "pose_right": error < near, "pose_told": told}
 
 
 def _placed_half_extent(placed: Retrieved) -> float:

@@ -45,6 +45,7 @@ RECOGNISED: list[Column] = [
     ("placed model to true surface, mm, of recognised", "placement_recognised", 1000, 2),
     ("its points to their true places, mm", "pose_recognised", 1000, 2),
     ("by less than a tenth of its diameter", "pose_right", 1, 3),
+    ("or of one that is told as alike", "pose_told", 1, 3),
     ("strangers taken for a stored object", "stranger_taken", 1, 3),
 ]
 PLACEMENT: list[Column] = [

@@ -184,7 +184,7 @@ def _inferred(
         # No shape is made of so few points.
         shared[-1] = 0
     kept = _kept(shared, config.map)
-    found, alike = placer.settled(found, kept[kept < len(found.placed)])
+    found = placer.settled(found, kept[kept < len(found.placed)])
     shared[: len(found.placed)] = found.weights[:-1]
     posterior, guess = infer_object(
         thing.observation,
@@ -192,7 +192,7 @@ def _inferred(
         scene.image.plane,
         lambda: thing.shown,
         scene.image.wave,
-        _shapes(thing, kept, found, alike, like),
+        _shapes(thing, kept, found, like),
         shared[kept] / shared[kept].sum(),
         config,
         thing.views,
@@ -268,7 +268,6 @@ def _shapes(
     thing: _Thing,
     kept: NDArray[np.int64],
     found: Placements,
-    alike: dict[int, Array],
     like: list[KinHypothesis],
 ) -> list[PlacedShape]:
     """Of the hypotheses `kept`: placements first, then kin; the completion has none."""
@@ -281,7 +280,7 @@ def _shapes(
             thing.scene.image.wave,
             thing.config,
             thing.views,
-            alike.get(i),
+            found.alike.get(i),
             thing.mask,
         )
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import pairwise
 
@@ -48,6 +48,7 @@ class Placements:
     placed : all n of them, in the order of `chosen`, by alignment score
     alone : (n,) log likelihood ratios in this frame, nats, against that it is none of them
     weights : (n + 1,) of the placements, and last that it is none of them
+    alike : by index, (K, 4, 4) T_cam_model of turns that are as probable as that placement
     """
 
     chosen: Chosen
@@ -55,6 +56,7 @@ class Placements:
     placed: Sequence[Hypothesis]
     alone: Sequence[float]
     weights: Array
+    alike: Mapping[int, Array] = field(default_factory=dict)
 
     @property
     def unknown(self) -> float:
@@ -74,9 +76,27 @@ class Placements:
         """Each object with its heaviest placement, the first of those that weigh as much, and the
         weight of all of them."""
         return [
-            _retrieved(name, probability, self.placed[a:b], self.weights[a:b])
+            self._retrieved(name, probability, slice(a, b))
             for (name, probability), (a, b) in zip(self.chosen, self.groups(), strict=True)
         ]
+
+    def _retrieved(self, name: str, probability: float, of: slice) -> Retrieved:
+        weight = float(self.weights[of].sum())
+        if not self.placed[of]:
+            return Retrieved(name, probability, weight=weight)
+        row = of.start + int(self.weights[of].argmax())
+        best = self.placed[row]
+        stored, turned = best.model.stored, self.alike.get(row, np.empty((0, 4, 4)))
+        return Retrieved(
+            name,
+            probability,
+            best.T_cam_object,
+            stored.mesh_pose(best.T_cam_object)[0],
+            best.scale,
+            alignment_score=best.alignment_score,
+            weight=weight,
+            alike=tuple(stored.mesh_pose(T @ best.model.T_model_object)[0] for T in turned),
+        )
 
     def groups(self) -> Iterable[tuple[int, int]]:
         """First and last but one index of each object's placements."""
@@ -127,13 +147,11 @@ class Placer:
             found = self._weighed(chosen, self._searched(chosen, begun, views.hopeless()))
         return found
 
-    def settled(
-        self, found: Placements, kept: NDArray[np.int64]
-    ) -> tuple[Placements, dict[int, Array]]:
+    def settled(self, found: Placements, kept: NDArray[np.int64]) -> Placements:
         """The placements with those of the indices `kept` brought nearer and turned as is most
-        probable, and by index the turns (K, 4, 4), T_cam_model, that are as good. The weight of an
-        object stays; that of its placements follows from how probable they have become."""
-        placed, alike = list(found.placed), {}
+        probable, and the turns that are as good. The weight of an object stays; that of its
+        placements follows from how probable they have become."""
+        placed, alike = list(found.placed), dict[int, Array]()
         for i in kept.tolist():
             placed[i] = self._nearer(placed[i])
             if not self._views:
@@ -155,7 +173,7 @@ class Placer:
                     weights[of_one] = self._shared_out(
                         weights[of_one].sum(), [placed[i] for i in of_one.tolist()]
                     )
-        return replace(found, placed=placed, weights=weights), alike
+        return replace(found, placed=placed, weights=weights, alike=alike)
 
     def _shared_out(self, weight: float, placed: Sequence[Hypothesis]) -> Array:
         """The weight of placements of one object, (n,), as probable as they are."""
@@ -295,23 +313,3 @@ class Placer:
         likelihood = self._config.likelihood
         found = evidence(T_cam_model, model, self.seen, likelihood, self._config.search.colour)
         return log_likelihood(found if asks_colour else replace(found, colour=0.0), likelihood)
-
-
-def _retrieved(
-    name: str, probability: float, group: Sequence[Hypothesis], weights: Array
-) -> Retrieved:
-    """The object with the heaviest of its placements, and the weight of all of them."""
-    weight = float(weights.sum())
-    if not group:
-        return Retrieved(name, probability, weight=weight)
-    best = group[int(weights.argmax())]
-    T_cam_mesh, _ = best.model.stored.mesh_pose(best.T_cam_object)
-    return Retrieved(
-        name,
-        probability,
-        best.T_cam_object,
-        T_cam_mesh,
-        best.scale,
-        alignment_score=best.alignment_score,
-        weight=weight,
-    )

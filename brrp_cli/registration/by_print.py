@@ -108,8 +108,8 @@ def _speaks_for(
     points = verifier.points[: turn.points]
     both = np.stack([other.T_cam_model, one.T_cam_model])
     exact = np.minimum(distances(both, one, points, exact=True), turn.far)
-    (_, worse), (_, doubt) = worse_than(0, exact, points, patch)
-    errors = worse / np.hypot(doubt, config.by_print.exact)
+    (_, worse), (_, doubt) = worse_than(0, exact, points, patch, turn.exact)
+    errors = worse / doubt
     return float(-0.5 * errors * abs(errors))
 
 

@@ -27,12 +27,18 @@ def distances(
     return np.asarray((distance * placed.scale).reshape(len(T_cam_model), -1))
 
 
-def worse_than(first: int, of: Array, points: Array, patch: float) -> tuple[Array, Array]:
+def worse_than(
+    first: int, of: Array, points: Array, patch: float, exact: float
+) -> tuple[Array, Array]:
     """Mean (K,), metres, by which points lie further from the surface under each placement than
-    under one of them, and its standard error over patches: neighbouring pixels err together."""
+    under one of them, and its standard error over patches: neighbouring pixels err together.
+
+    exact : metres to which such a mean is known, however many points there are: facets and files
+    are no more exact
+    """
     difference = of - of[first]
     cell = cells_of(points, patch)
     mean = difference.mean(axis=1)
     residual = difference - mean[:, None]
     sums = np.stack([np.bincount(cell, weights=each) for each in residual])
-    return mean, np.sqrt((sums**2).sum(axis=1)) / len(points)
+    return mean, np.hypot(np.sqrt((sums**2).sum(axis=1)) / len(points), exact)

@@ -74,10 +74,10 @@ def turned(
     if len(T) == 1:
         return Turned(placed, np.empty((0, 4, 4)))
     exact = np.minimum(distances(T, placed, points, exact=True), turn.far)
-    worse, doubt = worse_than(0, exact, points, patch)
+    worse, doubt = worse_than(0, exact, points, patch, turn.exact)
     better = worse + turn.gain * doubt
     first = int(np.argmin(np.where(_as_much_alike(T, placed, verifier, config), better, np.inf)))
-    worse, doubt = worse_than(first, exact, points, patch)
+    worse, doubt = worse_than(first, exact, points, patch, turn.exact)
     undecided = (worse <= turn.undecided * doubt) & (turned_by(T, T[first]) >= turn.apart)
     # As near as `placed`, which those that are refined would beat unfairly otherwise.
     best = placed if first == 0 else refine(replace(placed, T_cam_model=T[first]))

@@ -246,7 +246,7 @@ def _oriented_box(vertices: NDArray[np.floating]) -> dict[str, Any]:
 
 
 def _retrieved_record(found: Retrieved, T_target_cam: NDArray[np.float64]) -> dict[str, Any]:
-    """`T_cam_mesh` and `T_frame_mesh` are rigid, from the mesh file times `size_factor`, metres."""
+    """Poses `T_...` are rigid, from the mesh file times `size_factor`, metres."""
     placed = found.T_cam_mesh
     return {
         "name": found.name,
@@ -258,6 +258,7 @@ def _retrieved_record(found: Retrieved, T_target_cam: NDArray[np.float64]) -> di
         "weight": found.weight,
         "T_cam_mesh": None if placed is None else placed.tolist(),
         "T_frame_mesh": None if placed is None else (T_target_cam @ placed).tolist(),
+        "alike_T_cam_mesh": [each.tolist() for each in found.alike],
     }
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -53,6 +55,18 @@ def test_a_ball_that_is_turned_is_not_where_it_was():
     row = found("ball", ball, truth_of("ball"))
     assert row["pose_error"] == pytest.approx(np.pi / 2 * 0.05, rel=0.02)
     assert row["turn_error"] == pytest.approx(180, abs=0.1)
+
+
+def test_the_least_error_is_of_all_poses_that_are_alike():
+    own, truth = stored("ball"), truth_of("ball")
+    turned = truth.T_cam_mesh @ similarity(rotation=Rotation.from_rotvec([0, 0, 2]).as_matrix())
+    T_mesh_object = similarity(own.half_extent, translation=own.center)
+    alone = Retrieved("ball", 1.0, turned @ T_mesh_object, size_factor=1.0)
+    assert pose_error(alone, own, truth)["alike"] == 0
+    told = replace(alone, alike=(turned, truth.T_cam_mesh))
+    row = pose_error(told, own, truth)
+    assert row["alike"] == 2
+    assert row["pose_error"] > 0.05 and row["least_pose_error"] == pytest.approx(0, abs=1e-6)
 
 
 def test_another_mesh_has_coordinates_of_its_own():

@@ -88,6 +88,9 @@ def test_each_figure_is_over_the_objects_that_it_asks_for():
 
 def test_a_pose_is_right_within_a_tenth_of_the_diameter():
     known = {"recognised": True, "size_factor": 1.0, "visible_pixels": 20, "diameter": 0.2}
-    own = {"other_size": False, "pose_recognised": 0.019, "pose_right": True}
-    assert figures(**known, pose_error=0.019) == own
-    assert figures(**known, pose_error=0.021)["pose_right"] is False
+    right = {"pose_recognised": 0.019, "pose_right": True, "pose_told": True}
+    found = figures(**known, pose_error=0.019, least_pose_error=0.019)
+    assert found == {"other_size": False, **right}
+    found = figures(**known, pose_error=0.021, least_pose_error=0.01)
+    assert (found["pose_right"], found["pose_told"]) == (False, True)
+    assert figures(**known, pose_error=0.03, least_pose_error=0.021)["pose_told"] is False

@@ -118,6 +118,21 @@ def test_the_pose_of_the_record_is_that_of_the_mesh(result, folder, object_id):
     assert off.max() < 0.002
 
 
+def test_poses_that_the_frame_does_not_tell_apart_are_told(result, folder):
+    """A can without print stands as well turned about its axis, and upside down."""
+    item = next(o for o in result.objects if o.object_id == CAN)
+    best = max(item.retrieved, key=lambda each: each.weight)
+    stored = open_prior(folder).load(best.name)
+    surface = stored.center + stored.half_extent * stored.surface.astype(np.float64)
+    written = MeshSurface(item.surface.as_trimesh())
+    assert len(best.alike) >= 2
+    for T_cam_mesh in best.alike:
+        np.testing.assert_allclose(T_cam_mesh[:3, :3] @ T_cam_mesh[:3, :3].T, np.eye(3), atol=1e-6)
+        here, turned = (transform_points(T, surface) for T in (best.T_cam_mesh, T_cam_mesh))
+        assert np.linalg.norm(here - turned, axis=1).mean() > 0.005
+        assert written.nearest(turned).distance.mean() < 0.001
+
+
 def test_placements_weigh_what_they_are_worth_in_the_end(folder, truth):
     """Whatever they weighed before they were refined and turned; that of the object stays."""
     prior, frame = open_prior(folder), photograph(truth)
@@ -131,10 +146,10 @@ def test_placements_weigh_what_they_are_worth_in_the_end(folder, truth):
     aside = similarity(translation=np.array([0.2, 0.0, 0.0])) @ best.T_cam_model
     both = [replace(best, T_cam_model=aside), best]
     found = Placements([("box", 1.0)], [2], both, [0.0, 0.0], np.array([0.7, 0.2, 0.1]))
-    settled, _ = placer.settled(found, np.arange(2))
+    settled = placer.settled(found, np.arange(2))
     assert settled.weights[1] > 0.89
     assert settled.weights[:2].sum() == pytest.approx(0.9) and settled.unknown == 0.1
-    alone, _ = placer.settled(found, np.array([1]))
+    alone = placer.settled(found, np.array([1]))
     np.testing.assert_array_equal(alone.weights, found.weights)
 
 

@@ -8,7 +8,6 @@ from sparse_depth import without_depth
 from table_scene import MESHES, TABLE, in_camera, photograph, placed, stored
 
 from brrp_cli.config import ColourConfig, SearchConfig
-from brrp_cli.config.registration import MainAxesConfig
 from brrp_cli.geometry import similarity, transform_points
 from brrp_cli.registration.model import search_model
 from brrp_cli.registration.pose_search import Hypothesis, by_colour
@@ -16,7 +15,6 @@ from brrp_cli.registration.print_agreement import print_agreement
 from brrp_cli.registration.verification import Verifier
 
 CONFIG = ColourConfig()
-AXES = MainAxesConfig()
 
 
 @pytest.fixture(scope="module")
