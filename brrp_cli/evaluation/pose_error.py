@@ -45,8 +45,8 @@ def pose_error(placed: Retrieved, stored: PriorObject, truth: TruePose) -> Row:
     """`POSE` of a recognised object: the mean distance, metres, of points of its mesh from where
     they truly are; the angle, degrees, by which it is turned from there; how many other poses the
     frame does not tell apart from that one, and the least such distance of all of them; the largest
-    distance, metres, between any two points of the mesh. Empty where the true mesh has another box than the
-    stored one: its coordinates are others, too."""
+    distance, metres, between any two points of the mesh. Empty where the true mesh has another box
+    than the stored one: its coordinates are others, too."""
     assert placed.T_cam_object is not None
     vertices = stored.shape.vertices.astype(np.float64)
     ends = np.stack([vertices.min(axis=0), vertices.max(axis=0)])
@@ -57,7 +57,7 @@ def pose_error(placed: Retrieved, stored: PriorObject, truth: TruePose) -> Row:
     points = stored.center + stored.half_extent * surface
     there = transform_points(truth.T_cam_mesh, points)
 
-    def off(here: Array) -> float:
+    def off(here: NDArray[np.floating]) -> float:
         return float(np.linalg.norm(here - there, axis=1).mean())
 
     error = off(transform_points(placed.T_cam_object, surface))

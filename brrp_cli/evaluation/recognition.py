@@ -63,10 +63,10 @@ def recognition(
 def with_recognition(row: Row) -> Row:
     """With `RECOGNITION_FIGURES`, each where it has a meaning: of objects of the prior with at
     least 1,000 visible pixels, whether they are recognised and the weight of the true object; of
-    recognised ones, whether they are placed at another size, and the distance of the placed model
-    to the true surface, that of its points from where they truly are, whether that is less than a
-    tenth of its diameter, and whether it is for any of the poses that are alike; of others, whether more than half of the weight is on one stored
-    object."""
+    recognised ones, whether they are placed at another size, the distance of the placed model to
+    the true surface, that of its points from where they truly are, whether that is less than a
+    tenth of its diameter, and whether it is for any of the poses that are alike; of others, whether
+    more than half of the weight is on one stored object."""
     more: Row = {}
     recognised = row.get("recognised")
     if recognised is not None and row["visible_pixels"] >= CLEAR_PIXELS:
