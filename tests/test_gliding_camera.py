@@ -14,9 +14,11 @@ from test_unchanged_view import made as made
 
 from brrp_cli import Reconstructor
 from brrp_cli.config.tracking import TrackConfig
-from brrp_cli.geometry import inverse, transform_points
+from brrp_cli.geometry import inverse, similarity, transform_points, turn_about_z
 from brrp_cli.observation.support_plane import Plane
+from brrp_cli.reconstruction import Retrieved
 from brrp_cli.tracking.glided import glided
+from brrp_cli.tracking.moved import moved_object
 
 STEP = 0.03  # radians, a frame
 TRACK = TrackConfig()
@@ -46,6 +48,20 @@ def test_results_go_along_with_a_camera_that_moves_a_little(inferred):
         session(scene(START, **round_by(5)))
         session(scene(START, **round_by(6)))
     assert inferred == [[1, 2, 3]] * 2
+
+
+def test_poses_go_along_and_so_do_those_that_are_alike(inferred):
+    with Reconstructor(method="sphere", track=True) as session:
+        item = session(scene(START, **NOISE)).objects[0]
+    pose, other, T = (
+        similarity(rotation=turn_about_z(angle)[:3, :3], translation=np.array([0.1, angle, 0.5]))
+        for angle in (0.2, 0.7, -0.3)
+    )
+    told = Retrieved("ball", 1.0, pose, T_cam_mesh=pose, size_factor=1.0, alike=(other,))
+    (found,) = moved_object(replace(item, retrieved=[told]), T).retrieved
+    np.testing.assert_allclose(found.T_cam_object, T @ pose)
+    np.testing.assert_allclose(found.T_cam_mesh, T @ pose)
+    np.testing.assert_allclose(found.alike, [T @ other])
 
 
 def test_they_are_moved_from_where_they_were_inferred(inferred):

@@ -100,6 +100,7 @@ def _check_finite(item: ObjectReconstruction) -> None:
             probability=found.probability,
             T_cam_object=found.T_cam_object,
             T_cam_mesh=found.T_cam_mesh,
+            alike=found.alike,
             size_factor=found.size_factor,
             fitness=found.fitness,
             alignment_score=found.alignment_score,

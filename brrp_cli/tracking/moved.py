@@ -58,4 +58,5 @@ def _moved(found: Retrieved, T_now_then: NDArray[np.float64]) -> Retrieved:
         found,
         T_cam_object=None if found.T_cam_object is None else T_now_then @ found.T_cam_object,
         T_cam_mesh=None if found.T_cam_mesh is None else T_now_then @ found.T_cam_mesh,
+        alike=tuple(T_now_then @ each for each in found.alike),
     )

@@ -51,6 +51,16 @@ def test_an_object_lies_where_its_heaviest_placement_is(found, first, second):
     assert ball.T_cam_object is None and ball.T_cam_mesh is None
 
 
+def test_turns_that_are_as_probable_are_those_of_the_heaviest_placement(found):
+    half_turn = STANDING @ TO_MIDDLE @ similarity(rotation=np.diag([-1.0, -1.0, 1.0]))
+    told = replace(found, alike={0: half_turn[None], 1: np.stack([ASIDE, ASIDE])})
+    box, _, fruit = told.retrieved()
+    (alike,) = box.alike
+    turned = STANDING @ similarity(rotation=np.diag([-1.0, -1.0, 1.0]))
+    np.testing.assert_allclose(alike, turned, atol=1e-6)
+    assert fruit.alike == ()
+
+
 def test_of_an_object_the_best_ratio_counts(found):
     assert found.ratios() == {"box": 3.0, "fruit": 2.0}
 
