@@ -32,19 +32,18 @@ from brrp_cli.config.observation import (
     StrayConfig,
 )
 from brrp_cli.config.registration import (
-    ColourConfig,
     FeatureConfig,
     LikelihoodConfig,
     RayRefinementConfig,
     RegistrationConfig,
     SearchConfig,
-    TurnConfig,
     VerificationConfig,
     WeighConfig,
 )
 from brrp_cli.config.retrieval import RetrievalConfig
 from brrp_cli.config.seen_mask import SeenMaskConfig
 from brrp_cli.config.surface import SurfaceConfig
+from brrp_cli.config.turns import ColourConfig, TurnConfig
 from brrp_cli.errors import BrrpError
 
 __all__ = [

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from brrp_cli.geometry import transform_points
+from brrp_cli.geometry import rotation_angle, transform_points
 from brrp_cli.ground_truth.truth import TrueObject
 from brrp_cli.prior.objects import PriorObject
 from brrp_cli.reconstruction import Retrieved
@@ -74,9 +74,8 @@ def pose_error(placed: Retrieved, stored: PriorObject, truth: TruePose) -> Row:
 
 def _turned(T: Array, other: Array) -> float:
     """Degrees between two similarities (4, 4)."""
-    square = np.sqrt((T[:3, :3] ** 2).sum() * (other[:3, :3] ** 2).sum()) / 3
-    cosine = ((T[:3, :3] * other[:3, :3]).sum() / square - 1) / 2
-    return float(np.degrees(np.arccos(np.clip(cosine, -1, 1))))
+    between = T[:3, :3].T @ other[:3, :3]
+    return float(np.degrees(rotation_angle(between / np.cbrt(np.linalg.det(between)))))
 
 
 def _diameter(vertices: Array) -> float:

@@ -18,12 +18,12 @@ from numpy.typing import NDArray
 from brrp_cli.config import SurfaceConfig
 from brrp_cli.config.grasping import GraspConfig
 from brrp_cli.dependencies import import_library, import_open3d
-from brrp_cli.geometry import similarity
 from brrp_cli.grasping.scene import GraspObject
 from brrp_cli.inference.hypothesis_posterior import HypothesisPosterior
 from brrp_cli.inference.particles import particle_shares, particle_volumes
 from brrp_cli.inference.placed_shape import PlacedShape
 from brrp_cli.raycast import surface_scene
+from brrp_cli.registration.turns import motions
 from brrp_cli.surface.extract import grid_axes, level_set
 
 Array = NDArray[np.float64]
@@ -173,14 +173,10 @@ def _placed_shapes(posterior: object, item: GraspObject) -> dict[int, _Shape]:
 
 def _small_motion(shape: PlacedShape, rng: np.random.Generator) -> Array:
     """(4, 4) rigid, camera frame: a draw of how far the shape is from where it was placed."""
-    from scipy.spatial.transform import Rotation
-
     # A covariance of measured numbers may be indefinite by rounding.
     values, vectors = np.linalg.eigh((shape.covariance + shape.covariance.T) / 2)
     drawn = vectors @ (np.sqrt(np.maximum(values, 0)) * rng.normal(size=6))
-    R = Rotation.from_rotvec(drawn[:3]).as_matrix()
-    origin = shape.T_cam_shape[:3, 3]
-    return similarity(1.0, R, origin - R @ origin + drawn[3:])
+    return motions(drawn[None], shape.T_cam_shape[:3, 3])[0]
 
 
 def _level_sets(

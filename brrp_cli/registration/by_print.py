@@ -13,17 +13,16 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 from brrp_cli.config import SearchConfig
-from brrp_cli.config.registration import PrintConfig
+from brrp_cli.config.turns import PrintConfig
 from brrp_cli.frames.frame import Frame
 from brrp_cli.registration.model import Model
 from brrp_cli.registration.onto_itself import turns_onto_itself
 from brrp_cli.registration.point_distances import distances, worse_than
 from brrp_cli.registration.pose_search import Hypothesis
 from brrp_cli.registration.print_agreement import agreement, how_printed
-from brrp_cli.registration.turns import best_and_different
+from brrp_cli.registration.turns import best_and_different, motions
 from brrp_cli.registration.verification import Verifier
 
 Array = NDArray[np.float64]
@@ -154,7 +153,7 @@ def _followed(
     axes = np.concatenate([np.eye(len(deviation)), -np.eye(len(deviation))])
 
     def worth(moves: Array) -> Array:
-        T = _moved(T_cam_model, moves @ along.T)
+        T = motions(moves @ along.T, T_cam_model[:3, 3]) @ T_cam_model
         return np.asarray(nats(T) - 0.5 * ((moves / deviation) ** 2).sum(axis=1))
 
     at, step = np.zeros(len(deviation)), config.first_step
@@ -167,14 +166,5 @@ def _followed(
             at, best = tried[row], float(gained[row])
         else:
             step /= 2
-    found = _moved(T_cam_model, (at @ along.T)[None])
+    found = motions((along @ at)[None], T_cam_model[:3, 3]) @ T_cam_model
     return np.asarray(found[0]), float(nats(found)[0])
-
-
-def _moved(T: Array, motion: Array) -> Array:
-    """T (4, 4) turned about its origin by motion[:, :3], radians, and shifted by motion[:, 3:]
-    (B, 6), metres: (B, 4, 4)."""
-    found = np.tile(T, (len(motion), 1, 1))
-    found[:, :3, :3] = Rotation.from_rotvec(motion[:, :3]).as_matrix() @ T[:3, :3]
-    found[:, :3, 3] += motion[:, 3:]
-    return found

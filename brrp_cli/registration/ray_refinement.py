@@ -23,6 +23,7 @@ from brrp_cli.prior.shape import StoredShape
 from brrp_cli.registration.mask_edges import MaskEdges
 from brrp_cli.registration.ray_loops import pull_of_rays
 from brrp_cli.registration.seen_mask import SeenMask
+from brrp_cli.registration.turns import motions
 
 Array = NDArray[np.float64]
 # What residuals cost, nats, and the normal equations, (6, 6) and (6,), of turn and shift.
@@ -77,7 +78,7 @@ def refine_by_rays(
     least, since = cost, 0
     for _ in range(config.steps):
         step = np.linalg.solve(normal + before, fall)
-        T = _moved(T, np.asarray(step, dtype=np.float64), middle)
+        T = motions(np.asarray(step, dtype=np.float64)[None], middle)[0] @ T
         cost, normal, fall = pull(T)
         # Facets and silhouettes make the residuals jump: a step that makes it worse may lead on.
         since = 0 if cost < least - config.gain else since + 1
@@ -184,14 +185,6 @@ def _of_edges(
     weight = share**2 / edges.deviation**2
     cost = float((config.outlier**2 / 6 * (1 - share**3)).sum())
     return cost, rows.T @ (weight[:, None] * rows), rows.T @ (weight * gap)
-
-
-def _moved(T: Array, step: Array, middle: Array) -> Array:
-    """T turned about `middle` by step[:3], radians, and shifted by step[3:], metres."""
-    motion = np.eye(4)
-    motion[:3, :3] = Rotation.from_rotvec(step[:3]).as_matrix()
-    motion[:3, 3] = middle + step[3:] - motion[:3, :3] @ middle
-    return np.asarray(motion @ T)
 
 
 def _small(T: Array, start: Array, middle: Array, config: RayRefinementConfig) -> bool:

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from brrp_cli.config.registration import MainAxesConfig
+from brrp_cli.config.turns import MainAxesConfig
 from brrp_cli.geometry import turns_about
 
 Array = NDArray[np.float64]
@@ -47,6 +47,14 @@ def about_main_axes(surface: Array, turns: int, config: MainAxesConfig) -> Array
         over = Rotation.from_rotvec(np.pi * axes[:, i - 1])
         found += [turned.as_matrix(), (turned * over).as_matrix()]
     return turns_about(np.concatenate([np.zeros((0, 3, 3)), *found]), middle)
+
+
+def motions(steps: Array, middle: Array) -> Array:
+    """(B, 4, 4) turns about a point `middle` (3,) by steps[:, :3], radians, followed by shifts by
+    steps[:, 3:] (B, 6), metres."""
+    found = turns_about(Rotation.from_rotvec(steps[:, :3]).as_matrix(), middle)
+    found[:, :3, 3] += steps[:, 3:]
+    return found
 
 
 def best_and_different(turns: Array, score: Array, count: int, apart: float) -> NDArray[np.int64]:

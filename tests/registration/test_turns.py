@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from brrp_cli.config.registration import MainAxesConfig
+from brrp_cli.config.turns import MainAxesConfig
 from brrp_cli.registration.turns import about_main_axes, best_and_different, turns_about_itself
 
 AXES = MainAxesConfig()
