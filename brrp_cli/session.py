@@ -33,6 +33,7 @@ from brrp_cli.methods.registry import DEFAULT, reconstructing_method
 from brrp_cli.methods.shared_work import started_later
 from brrp_cli.prior.store import Prior, open_prior
 from brrp_cli.reconstruction import ObjectReconstruction, Reconstruction
+from brrp_cli.registration.exchanged_colours import ColourCheck
 from brrp_cli.retrieval.base import one_image
 from brrp_cli.tracking.tracker import Made, Tracker
 
@@ -98,6 +99,7 @@ class Reconstructor:
         self._tracker: Tracker | None = None
         if config_of_tracks is not None:
             self._tracker = Tracker(config_of_tracks, self._segmentation.mend.least_part)
+        self._ask_colours = ColourCheck(self._prior)
         self._segmenter: PromptSegmenter | None = None
         if prompt is not None:
             from brrp_cli.segmentation.prompted.segment_by_prompt import PromptSegmenter
@@ -113,6 +115,7 @@ class Reconstructor:
         require_frame(frame)
         with one_image(self._retriever):
             result = self._reconstructed(frame)
+        self._ask_colours(result)
         # Who asks for one frame only has no use for them.
         self.helpers.start()
         return result

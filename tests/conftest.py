@@ -12,7 +12,7 @@ from brrp_cli.executors import processes
 # Dask's workers too, see `workers_are_forked`; read when Dask is imported.
 os.environ["DASK_DISTRIBUTED__WORKER__MULTIPROCESSING_METHOD"] = "forkserver"
 
-pytest_plugins = ["pointsdf_fixtures", "starter_fixtures", "table_fixtures"]
+pytest_plugins = ["box_and_can", "pointsdf_fixtures", "starter_fixtures", "table_fixtures"]
 
 
 @pytest.fixture(scope="session", autouse=True)

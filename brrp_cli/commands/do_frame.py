@@ -29,10 +29,12 @@ def on_its_own(given: dict[str, Any], helpers: Helpers) -> DoFrame:
     from brrp_cli.api import reconstruct, try_masks
     from brrp_cli.mending.again import Again
     from brrp_cli.mending.mend import mend
+    from brrp_cli.registration.exchanged_colours import ColourCheck
     from brrp_cli.retrieval.base import one_image
 
     run: Callable[..., Reconstruction] = partial(reconstruct, **given, helpers=helpers)
     again = Again(run, partial(try_masks, **given, helpers=helpers))
+    ask_colours = ColourCheck(given["prior"])
 
     def do(frame: Frame, masks: MadeMasks | None, output: Path) -> Reconstruction:
         with one_image(given["retriever"]):
@@ -46,6 +48,7 @@ def on_its_own(given: dict[str, Any], helpers: Helpers) -> DoFrame:
                     masks.aside,
                     corrected=masks.corrected,
                 )
+        ask_colours(result)
         helpers.start()
         if masks is None:
             return result

@@ -67,7 +67,8 @@ class TurnConfig:
     that are worse by no more than `undecided` standard errors, in alignment score by no more than
     `alike`, and in the likelihood of the frame by no more than `nats`, are as probable; of those
     that are worse by `refined_nats` more at most, the best `refined` are refined first, as the
-    first one was. The most probable of all takes the place of the first.
+    first one was. The most probable of all takes the place of the first; in a later frame of a
+    stream only if it is more probable by `steady` nats: otherwise the earlier pose holds.
     """
 
     turns: int = 36
@@ -91,6 +92,7 @@ class TurnConfig:
     nats: float = 2.0
     refined_nats: float = 6.0
     refined: int = 3
+    steady: float = between(2.0, 0.0, 1000.0)
     alike: float = 0.1
     main_axes: MainAxesConfig = field(default_factory=MainAxesConfig)
 

@@ -31,7 +31,7 @@ from brrp_cli.registration.model import search_model
 from brrp_cli.registration.pose_search import Hypothesis, start_from
 from brrp_cli.registration.ray_refinement import OtherRays
 from brrp_cli.registration.verification import Verifier
-from brrp_cli.registration.weigh import SeenFrom
+from brrp_cli.registration.views import SeenFrom
 
 Array = NDArray[np.float64]
 
@@ -183,9 +183,9 @@ class EarlierViews:
             for v in self.views
         ]
 
-    def seen(self) -> list[SeenFrom]:
+    def seen(self) -> tuple[SeenFrom, ...]:
         """Of each, for weighing a placement."""
-        return [SeenFrom(v.memory.seen, v.T_then_now) for v in self.views]
+        return tuple(SeenFrom(v.memory.seen, v.T_then_now) for v in self.views)
 
     def depths(self) -> list[OtherDepth]:
         """Of each, for what cannot be in space that it saw to be free."""

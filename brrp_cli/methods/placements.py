@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import partial
+from functools import cached_property, partial
 from itertools import pairwise
 
 import numpy as np
@@ -15,8 +15,8 @@ from brrp_cli.methods.earlier_views import EarlierViews
 from brrp_cli.methods.scene import SeenScene
 from brrp_cli.observation.ray_samples import ObjectObservation
 from brrp_cli.reconstruction import Retrieved
-from brrp_cli.registration.by_print import turned_by_print
-from brrp_cli.registration.likelihood import SeenPixels, evidence, log_likelihood, see
+from brrp_cli.registration.by_print import joint_print_nats, turned_by_print
+from brrp_cli.registration.likelihood import SeenPixels, see
 from brrp_cli.registration.model import Model, search_model
 from brrp_cli.registration.pose_covariance import pose_covariance
 from brrp_cli.registration.pose_search import Hypothesis, search
@@ -24,16 +24,17 @@ from brrp_cli.registration.refined import refined
 from brrp_cli.registration.scale_scan import observed_cloud
 from brrp_cli.registration.turned import turned
 from brrp_cli.registration.verification import Verifier
+from brrp_cli.registration.views import SeenFrom, Views
 from brrp_cli.registration.weigh import (
-    SeenFrom,
     best_ratios,
     joint_log_likelihood,
     judged,
+    other_size,
     piece_doubt,
     weigh,
 )
 from brrp_cli.retrieval.base import unknown
-from brrp_cli.seeds import child_seed
+from brrp_cli.seeds import child_rng, child_seed
 
 Array = NDArray[np.float64]
 # Name and P(c|R) of stored objects.
@@ -135,6 +136,17 @@ class Placer:
             verifier.lost,
         )
 
+    @cached_property
+    def _every_view(self) -> Views:
+        views, points = self._views, self._verifier.points
+        seen = SeenFrom(self.seen, np.eye(4)), *views.seen()
+        if views:
+            # The first points of all are to be from all views.
+            points = np.concatenate([points, *views.points()])
+            rng = child_rng(self._scene.seed, "views", self._observation.object_id)
+            points = points[rng.permutation(len(points))]
+        return Views(seen, points, views.votes(self._observation.center))
+
     def placements(self, chosen: Chosen, begun: dict[str, list[Hypothesis]]) -> Placements:
         """Of the objects `chosen`. `begun` : those that start from earlier frames, by name; they
         are searched for too where that leaves doubt. Errors: PriorError."""
@@ -153,34 +165,34 @@ class Placer:
         placements follows from how probable they have become."""
         placed, alike = list(found.placed), dict[int, Array]()
         for i in kept.tolist():
-            placed[i] = self._nearer(placed[i])
-            if not self._views:
-                placed[i] = self._turned_by_print(placed[i])
-                best = turned(
-                    placed[i],
-                    self._verifier,
-                    self._config.sensor.patch,
-                    self._config.search,
-                    partial(self._log_likelihood, placed[i].model),
-                    self._nearer,
-                )
-                placed[i], alike[i] = best.best, best.alike
+            placed[i] = self._turned_by_print(self._nearer(placed[i]))
+            best = turned(
+                placed[i],
+                self._verifier,
+                self._every_view,
+                self._config.sensor.patch,
+                self._config.search,
+                partial(self._as_printed, placed[i].model),
+                self._nearer,
+                self._config.search.about_itself.steady if self._views else 0.0,
+            )
+            placed[i], alike[i] = best.best, best.alike
         weights = found.weights.copy()
-        if not self._views:
-            for a, b in found.groups():
-                of_one = kept[(a <= kept) & (kept < b)]
-                if len(of_one) > 1:
-                    weights[of_one] = self._shared_out(
-                        weights[of_one].sum(), [placed[i] for i in of_one.tolist()]
-                    )
+        for a, b in found.groups():
+            of_one = kept[(a <= kept) & (kept < b)]
+            if len(of_one) > 1:
+                weights[of_one] = self._shared_out(
+                    weights[of_one].sum(), [placed[i] for i in of_one.tolist()]
+                )
         return replace(found, placed=placed, weights=weights, alike=alike)
 
     def _shared_out(self, weight: float, placed: Sequence[Hypothesis]) -> Array:
         """The weight of placements of one object, (n,), as probable as they are."""
-        log = np.array([self._log_likelihood(each.model, each.T_cam_model) for each in placed])
-        resized = np.array([abs(np.log(each.scale)) for each in placed])
-        log -= self._config.likelihood.other_size * (
-            resized > self._config.search.least_size_change
+        log = np.array(
+            [
+                self._log_likelihood(each.model, each.T_cam_model) - other_size(each, self._config)
+                for each in placed
+            ]
         )
         share = np.exp(log - log.max())
         return np.asarray(weight * share / share.sum())
@@ -244,14 +256,14 @@ class Placer:
         """Placements fitted to the rays of all views, and their log likelihood ratios in all of
         them: of those whose ratio in this frame, `alone`, comes near the best."""
         views = self._views
-        every = [SeenFrom(self.seen, np.eye(4)), *views.seen()]
-        votes = views.votes(self._observation.center)
         near = [ratio > max(alone) - views.config.worth for ratio in alone]
         placed = [
             self._nearer(each) if asked else each for each, asked in zip(placed, near, strict=True)
         ]
         asked_ratios = [
-            joint_log_likelihood(each, every, votes, self._config) if asked else -np.inf
+            self._log_likelihood(each.model, each.T_cam_model) - other_size(each, self._config)
+            if asked
+            else -np.inf
             for each, asked in zip(placed, near, strict=True)
         ]
         # The others stay as far behind as they were.
@@ -292,12 +304,13 @@ class Placer:
                 verifier.points,
                 self._scene.image.wave,
                 free,
+                self._views.points(),
                 mask=verifier.mask,
             )
 
         return turned_by_print(
             each,
-            verifier,
+            self._every_view,
             sensor.patch,
             search,
             partial(self._log_likelihood, each.model, asks_colour=False),
@@ -305,11 +318,22 @@ class Placer:
             covariance,
         )
 
+    def _as_printed(self, model: Model, T_cam_model: Array) -> float:
+        """Of a placement, against that it is none of the stored objects, nats, in all views of it:
+        with the votes of its print, which tell turns apart more finely than the likelihood's
+        colour."""
+        search = self._config.search
+        if not search.by_print.asked:
+            return self._log_likelihood(model, T_cam_model)
+        printed = joint_print_nats(T_cam_model[None], model, self._every_view, search)
+        other = self._log_likelihood(model, T_cam_model, asks_colour=False)
+        return other + float(printed[0])
+
     def _log_likelihood(
         self, model: Model, T_cam_model: Array, *, asks_colour: bool = True
     ) -> float:
-        """Of a placement, against that it is none of the stored objects, nats; with its print or
-        without."""
-        likelihood = self._config.likelihood
-        found = evidence(T_cam_model, model, self.seen, likelihood, self._config.search.colour)
-        return log_likelihood(found if asks_colour else replace(found, colour=0.0), likelihood)
+        """Of a placement, against that it is none of the stored objects, nats, in all views of it;
+        with its print or without."""
+        return joint_log_likelihood(
+            T_cam_model, model, self._every_view, self._config, asks_colour=asks_colour
+        )

@@ -23,7 +23,7 @@ from brrp_cli.registration.point_distances import distances, worse_than
 from brrp_cli.registration.pose_search import Hypothesis
 from brrp_cli.registration.print_agreement import agreement, how_printed
 from brrp_cli.registration.turns import best_and_different, motions
-from brrp_cli.registration.verification import Verifier
+from brrp_cli.registration.views import Views
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -31,7 +31,7 @@ Mask = NDArray[np.bool_]
 
 def turned_by_print(
     placed: Hypothesis,
-    verifier: Verifier,
+    views: Views,
     patch: float,
     config: SearchConfig,
     judge: Callable[[Array], float],
@@ -51,7 +51,7 @@ def turned_by_print(
         return placed
 
     def nats(T: Array) -> Array:
-        return print_nats(T, model, verifier.frame, config, verifier.lost)
+        return joint_print_nats(T, model, views, config)
 
     def nearer(each: Hypothesis) -> tuple[Hypothesis, float]:
         T = each.T_cam_model
@@ -66,7 +66,7 @@ def turned_by_print(
     best = _Judged(placed, float(printed[0]), judge)
 
     def better(each: _Judged, gain: float) -> bool:
-        depth = _speaks_for(each.placed, best.placed, verifier, patch, config)
+        depth = _speaks_for(each.placed, best.placed, views, patch, config)
         return each.printed - best.printed + each.otherwise - best.otherwise + depth > gain
 
     moved = _Judged(*nearer(placed), judge)
@@ -99,17 +99,28 @@ class _Judged:
 
 
 def _speaks_for(
-    one: Hypothesis, other: Hypothesis, verifier: Verifier, patch: float, config: SearchConfig
+    one: Hypothesis, other: Hypothesis, views: Views, patch: float, config: SearchConfig
 ) -> float:
     """Nats by which the distances of observed points speak for one placement and against the other
     one; less than 0 where they speak against it."""
     turn = config.about_itself
-    points = verifier.points[: turn.points]
+    points = views.points[: turn.points]
     both = np.stack([other.T_cam_model, one.T_cam_model])
     exact = np.minimum(distances(both, one, points, exact=True), turn.far)
     (_, worse), (_, doubt) = worse_than(0, exact, points, patch, turn.exact)
     errors = worse / doubt
     return float(-0.5 * errors * abs(errors))
+
+
+def joint_print_nats(T_cam_model: Array, model: Model, views: Views, config: SearchConfig) -> Array:
+    """(B,) `print_nats` of placements (B, 4, 4) in all views; 0 of a model without colours."""
+    if not model.stored.record.get("coloured"):
+        return np.zeros(len(T_cam_model))
+    return views.joint(
+        lambda view: print_nats(
+            view.T_view_cam @ T_cam_model, model, view.seen.frame, config, view.seen.lost
+        )
+    )
 
 
 def print_nats(

@@ -18,11 +18,11 @@ from brrp_cli.config import SearchConfig, TurnConfig
 from brrp_cli.registration.onto_itself import turned_by, turns_onto_itself
 from brrp_cli.registration.point_distances import distances, worse_than
 from brrp_cli.registration.pose_search import Hypothesis, different
-from brrp_cli.registration.print_agreement import print_agreement
 from brrp_cli.registration.sdf_refinement import refine_to_sdf
 from brrp_cli.registration.transform_loops import inverses
 from brrp_cli.registration.turns import best_and_different
 from brrp_cli.registration.verification import Verifier
+from brrp_cli.registration.views import Views
 
 Array = NDArray[np.float64]
 
@@ -39,22 +39,25 @@ class Turned:
 def turned(
     placed: Hypothesis,
     verifier: Verifier,
+    views: Views,
     patch: float,
     config: SearchConfig,
     judge: Callable[[Array], float],
     refine: Callable[[Hypothesis], Hypothesis],
+    steady: float = 0.0,
 ) -> Turned:
     """`placed`, or turned about itself where that is more probable; and what is nearly as probable.
 
     patch : metres; pixels within one err together and are one vote
-    judge : log likelihood ratio, nats, of a placement T_cam_model (4, 4)
+    judge : log likelihood ratio, nats, of a placement T_cam_model (4, 4), in all views
     refine : brings a placement as near as `placed` came, which takes its time
+    steady : nats by which another one has to be more probable to take the place of `placed`
     """
     turn = config.about_itself
     start = turns_onto_itself(placed.model, turn)
     if not len(start):
         return Turned(placed, np.empty((0, 4, 4)))
-    points = verifier.points[: turn.points]
+    points = views.points[: turn.points]
     T = placed.T_cam_model @ start
     coarse = np.minimum(distances(T, placed, points[: turn.coarse_points]), turn.far).mean(axis=1)
     T = T[best_and_different(start[:, :3, :3], -coarse, turn.count, turn.apart)]
@@ -75,12 +78,13 @@ def turned(
         return Turned(placed, np.empty((0, 4, 4)))
     exact = np.minimum(distances(T, placed, points, exact=True), turn.far)
     worse, doubt = worse_than(0, exact, points, patch, turn.exact)
-    better = worse + turn.gain * doubt
-    first = int(np.argmin(np.where(_as_much_alike(T, placed, verifier, config), better, np.inf)))
-    worse, doubt = worse_than(first, exact, points, patch, turn.exact)
-    undecided = (worse <= turn.undecided * doubt) & (turned_by(T, T[first]) >= turn.apart)
+    first = int(np.argmin(worse + turn.gain * doubt))
     # As near as `placed`, which those that are refined would beat unfairly otherwise.
     best = placed if first == 0 else refine(replace(placed, T_cam_model=T[first]))
+    if first and judge(best.T_cam_model) < judge(placed.T_cam_model) + steady:
+        first, best = 0, placed
+    worse, doubt = worse_than(first, exact, points, patch, turn.exact)
+    undecided = (worse <= turn.undecided * doubt) & (turned_by(T, T[first]) >= turn.apart)
     if not undecided.any():
         return Turned(best, np.empty((0, 4, 4)))
     own = judge(best.T_cam_model)
@@ -88,6 +92,7 @@ def turned(
     found = [(own, best), *_as_probable(others, own - turn.nats, turn, judge, refine)]
     # The first of those that are equal.
     most = max(range(len(found)), key=lambda row: found[row][0])
+    most = most if found[most][0] >= own + steady else 0
     _, chosen = found.pop(most)
     best = best if most == 0 else refine(chosen)
     return Turned(best, np.array([each.T_cam_model for _, each in found]).reshape(-1, 4, 4))
@@ -125,17 +130,3 @@ def _as_much_explained(
         seen_points=config.fine_points,
     )
     return np.asarray(score >= score[0] - config.about_itself.alike)
-
-
-def _as_much_alike(
-    T: Array, placed: Hypothesis, verifier: Verifier, config: SearchConfig
-) -> NDArray[np.bool_]:
-    """(K,) whether the image's colours speak no more against each placement than against the
-    first."""
-    if not placed.model.stored.record.get("coloured"):
-        return np.ones(len(T), dtype=np.bool_)
-    colour = config.colour
-    agreement = np.array(
-        [print_agreement(each, placed.model, verifier.frame, colour, verifier.lost) for each in T]
-    )
-    return np.asarray(colour.worth * (agreement - agreement[0]) >= -colour.gain)

@@ -3,25 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from brrp_cli.config import HypothesesConfig, WeighConfig
 from brrp_cli.registration.likelihood import SeenPixels, evidence, log_likelihood
+from brrp_cli.registration.model import Model
 from brrp_cli.registration.pose_search import Hypothesis
+from brrp_cli.registration.views import SeenFrom, Views
 
 Array = NDArray[np.float64]
-
-
-@dataclass(frozen=True)
-class SeenFrom:
-    """seen : the object in a frame; T_view_cam : (4, 4) rigid, from the present frame's camera to
-    that one's"""
-
-    seen: SeenPixels
-    T_view_cam: Array
 
 
 def counted_once(config: HypothesesConfig, knows_depth: bool) -> HypothesesConfig:
@@ -51,8 +44,7 @@ def judged(
         if each.alignment_score < least:
             return -np.inf
         found = evidence(each.T_cam_model, each.model, seen, likelihood, config.search.colour)
-        resized = abs(np.log(each.scale)) > config.search.least_size_change
-        return log_likelihood(found, likelihood) - likelihood.other_size * resized
+        return log_likelihood(found, likelihood) - other_size(each, config)
 
     placed, ratios = list(placed), [ratio(each) for each in placed]
     for name, most in best_ratios(placed, ratios).items():
@@ -68,28 +60,29 @@ def judged(
 
 
 def joint_log_likelihood(
-    placed: Hypothesis, views: Sequence[SeenFrom], votes: float, config: HypothesesConfig
+    T_cam_model: Array,
+    model: Model,
+    views: Views,
+    config: HypothesesConfig,
+    *,
+    asks_colour: bool = True,
 ) -> float:
-    """Of a placement, against that it is none of the stored objects, nats, in all views of it.
+    """Of a placement T_cam_model (4, 4), against that it is none of the stored objects, nats, in
+    all views of it; with its print or without."""
+    likelihood, colour = config.likelihood, config.search.colour
 
-    Ratios of views that err independently add up: the mean of all counts `votes` times.
-    """
-    likelihood = config.likelihood
-    ratios = [
-        log_likelihood(
-            evidence(
-                view.T_view_cam @ placed.T_cam_model,
-                placed.model,
-                view.seen,
-                likelihood,
-                config.search.colour,
-            ),
-            likelihood,
-        )
-        for view in views
-    ]
+    def ratio(view: SeenFrom) -> float:
+        T_view_model = view.T_view_cam @ T_cam_model
+        found = evidence(T_view_model, model, view.seen, likelihood, colour)
+        return log_likelihood(found if asks_colour else replace(found, colour=0.0), likelihood)
+
+    return float(views.joint(ratio))
+
+
+def other_size(placed: Hypothesis, config: HypothesesConfig) -> float:
+    """Nats against a placement whose size is not the stored one's."""
     resized = abs(np.log(placed.scale)) > config.search.least_size_change
-    return votes * float(np.mean(ratios)) - likelihood.other_size * resized
+    return config.likelihood.other_size * float(resized)
 
 
 def best_ratios(placed: Sequence[Hypothesis], ratios: Sequence[float]) -> dict[str, float]:

@@ -7,23 +7,20 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-import trimesh
+from box_and_can import can, iou
 from sparse_depth import at_the_edge, without_depth
-from table_scene import T_CAM_WORLD, T_WORLD_CAM, box, in_camera, photograph, placed
+from table_scene import box, in_camera, photograph, placed
 
 from brrp_cli import Reconstructor, open_posterior, open_prior, reconstruct, write_results
 from brrp_cli.config import SearchConfig, preset
 from brrp_cli.errors import BrrpError, RetrievalError
-from brrp_cli.geometry import similarity, transform_points, turn_about_z
+from brrp_cli.geometry import similarity, transform_points
 from brrp_cli.ground_truth.surface_metrics import MeshSurface
 from brrp_cli.methods.base import Setup
 from brrp_cli.methods.earlier_views import ALONE
 from brrp_cli.methods.placements import Placements, Placer
 from brrp_cli.methods.scene import look_at
 from brrp_cli.observation.ray_samples import without_samples
-from brrp_cli.prior.build.build import build_prior
-from brrp_cli.prior.parameters import AppearanceConfig, BuildParameters
-from brrp_cli.raycast import inside
 from brrp_cli.reconstruction import METRES, NO_SURFACE, OK, TOO_FEW_POINTS
 from brrp_cli.registration.verification import Verifier
 from brrp_cli.retrieval.given import TruthRetriever
@@ -31,31 +28,6 @@ from brrp_cli.shapes import solids
 
 BOX, CAN, STRANGE = 9, 4, 6
 CONFIG = preset("default")
-
-
-def can() -> trimesh.Trimesh:
-    return solids.cylinder(0.04, 0.12)
-
-
-def iou(surface, mesh):
-    """Of a reconstructed surface with the true mesh, both in the camera frame."""
-    low, high = mesh.bounds[0] - 0.04, mesh.bounds[1] + 0.04
-    points = np.random.default_rng(0).uniform(low, high, (20_000, 3))
-    found, true = inside(surface.as_trimesh(), points), inside(mesh, points)
-    return (found & true).sum() / (found | true).sum()
-
-
-@pytest.fixture(scope="module")
-def folder(tmp_path_factory):
-    """A prior of the box and the can, as `brrp build-prior` makes it."""
-    meshes = tmp_path_factory.mktemp("meshes")
-    box().export(meshes / "box.ply")
-    can().export(meshes / "can.ply")
-    out = tmp_path_factory.mktemp("prior") / "prior"
-    looks = AppearanceConfig(views=8, rays=500)
-    parameters = BuildParameters(samples=1000, dense_points=5000, appearance=looks)
-    build_prior(meshes, out, parameters, workers=1)
-    return out
 
 
 @pytest.fixture(scope="module")
@@ -68,8 +40,8 @@ def truth():
 
 
 @pytest.fixture(scope="module")
-def result(folder, truth):
-    return reconstruct(photograph(truth), open_prior(folder), workers=2)
+def result(box_and_can, truth):
+    return reconstruct(photograph(truth), open_prior(box_and_can), workers=2)
 
 
 @pytest.mark.parametrize("object_id", [BOX, CAN])
@@ -96,9 +68,9 @@ def test_the_record_tells_of_evidence_and_weights(result):
         assert sum(probabilities) + item.unknown_probability == pytest.approx(1)
 
 
-def test_the_best_placement_is_the_true_one(result, truth, folder):
+def test_the_best_placement_is_the_true_one(result, truth, box_and_can):
     """Points of the stored surface lie on the true one: a can may be turned, a box by halves."""
-    stored = open_prior(folder).load("can")
+    stored = open_prior(box_and_can).load("can")
     item = result.objects[0]
     surface = transform_points(item.retrieved[0].T_cam_object, stored.surface.astype(np.float64))
     true = placed(0.09, -0.04, 0.0)
@@ -109,20 +81,20 @@ def test_the_best_placement_is_the_true_one(result, truth, folder):
 
 
 @pytest.mark.parametrize("object_id", [BOX, CAN])
-def test_the_pose_of_the_record_is_that_of_the_mesh(result, folder, object_id):
+def test_the_pose_of_the_record_is_that_of_the_mesh(result, box_and_can, object_id):
     item = next(o for o in result.objects if o.object_id == object_id)
     best = max(item.retrieved, key=lambda each: each.weight)
-    shape = open_prior(folder).load(best.name).shape
+    shape = open_prior(box_and_can).load(best.name).shape
     vertices = transform_points(best.T_cam_object, shape.vertices.astype(np.float64))
     off = MeshSurface(item.surface.as_trimesh()).nearest(vertices).distance
     assert off.max() < 0.002
 
 
-def test_poses_that_the_frame_does_not_tell_apart_are_told(result, folder):
+def test_poses_that_the_frame_does_not_tell_apart_are_told(result, box_and_can):
     """A can without print stands as well turned about its axis, and upside down."""
     item = next(o for o in result.objects if o.object_id == CAN)
     best = max(item.retrieved, key=lambda each: each.weight)
-    stored = open_prior(folder).load(best.name)
+    stored = open_prior(box_and_can).load(best.name)
     surface = stored.center + stored.half_extent * stored.surface.astype(np.float64)
     written = MeshSurface(item.surface.as_trimesh())
     assert len(best.alike) >= 2
@@ -133,9 +105,9 @@ def test_poses_that_the_frame_does_not_tell_apart_are_told(result, folder):
         assert written.nearest(turned).distance.mean() < 0.001
 
 
-def test_placements_weigh_what_they_are_worth_in_the_end(folder, truth):
+def test_placements_weigh_what_they_are_worth_in_the_end(box_and_can, truth):
     """Whatever they weighed before they were refined and turned; that of the object stays."""
-    prior, frame = open_prior(folder), photograph(truth)
+    prior, frame = open_prior(box_and_can), photograph(truth)
     retriever = Sure([0.5, 0.5])
     scene = look_at(frame, Setup(CONFIG, prior=prior, retriever=retriever), retriever)
     observation = without_samples(scene.frame, BOX)
@@ -169,17 +141,17 @@ def test_a_recognised_object_is_known_to_millimetres_on_all_sides(result):
     assert back == pytest.approx(front, rel=0.05)
 
 
-def test_the_same_seed_gives_the_same_bytes(result, folder, truth):
-    again = reconstruct(photograph(truth), open_prior(folder), workers=2)
+def test_the_same_seed_gives_the_same_bytes(result, box_and_can, truth):
+    again = reconstruct(photograph(truth), open_prior(box_and_can), workers=2)
     for a, b in zip(result.objects, again.objects, strict=True):
         assert a.surface.vertices.tobytes() == b.surface.vertices.tobytes()
         assert a.surface.uncertainty.tobytes() == b.surface.uncertainty.tobytes()
 
 
-def test_an_object_that_the_prior_does_not_hold_gets_the_shape_of_what_was_seen(folder):
+def test_an_object_that_the_prior_does_not_hold_gets_the_shape_of_what_was_seen(box_and_can):
     """A lying bar, of a shape that nothing stored comes near."""
     strange = in_camera(solids.box(0.20, 0.05, 0.05), placed(0.0, 0.0, 1.3))
-    found = reconstruct(photograph({STRANGE: strange}), open_prior(folder)).objects[0]
+    found = reconstruct(photograph({STRANGE: strange}), open_prior(box_and_can)).objects[0]
     assert found.unknown_weight > 0.5
     front, back = uncertainty(found)
     assert 0.0005 < front < back < 0.05, "less is known of what nobody saw"
@@ -187,9 +159,9 @@ def test_an_object_that_the_prior_does_not_hold_gets_the_shape_of_what_was_seen(
 
 
 @pytest.mark.parametrize("stream", [False, True])
-def test_a_stored_object_with_hardly_any_depth_is_placed_by_its_mask(folder, truth, stream):
+def test_a_stored_object_with_hardly_any_depth_is_placed_by_its_mask(box_and_can, truth, stream):
     """Eight points at the edge of its mask, and those are 2 cm too far away."""
-    frame, prior = at_the_edge(photograph(truth), BOX, 8, 0.02), open_prior(folder)
+    frame, prior = at_the_edge(photograph(truth), BOX, 8, 0.02), open_prior(box_and_can)
     if stream:
         with Reconstructor(prior, workers=1, track=True) as session:
             found = session(frame)
@@ -202,18 +174,18 @@ def test_a_stored_object_with_hardly_any_depth_is_placed_by_its_mask(folder, tru
     assert item.surface.uncertainty.mean() > 0.003, "where it stands is supposed, not seen"
 
 
-def test_no_shape_is_made_of_a_few_points_of_what_the_prior_does_not_hold(folder):
+def test_no_shape_is_made_of_a_few_points_of_what_the_prior_does_not_hold(box_and_can):
     strange = in_camera(solids.box(0.20, 0.05, 0.05), placed(0.0, 0.0, 1.3))
     frame = at_the_edge(photograph({STRANGE: strange}), STRANGE, 8, 0.0)
-    found = reconstruct(frame, open_prior(folder)).objects[0]
+    found = reconstruct(frame, open_prior(box_and_can)).objects[0]
     assert found.status == TOO_FEW_POINTS and found.surface is None
     assert "8 valid depth points, 16 are needed" in found.message
-    nothing = reconstruct(without_depth(frame, STRANGE), open_prior(folder)).objects[0]
+    nothing = reconstruct(without_depth(frame, STRANGE), open_prior(box_and_can)).objects[0]
     assert (nothing.status, nothing.n_points) == (TOO_FEW_POINTS, 0)
 
 
-def test_retrieval_that_is_wrong_is_outweighed_by_what_the_frame_says(folder, truth):
-    prior = open_prior(folder)
+def test_retrieval_that_is_wrong_is_outweighed_by_what_the_frame_says(box_and_can, truth):
+    prior = open_prior(box_and_can)
     wrong = TruthRetriever(prior.names, {CAN: "box"})
     found = reconstruct(photograph({CAN: truth[CAN]}), prior, retriever=wrong).objects[0]
     weights = {r.name: r.weight for r in found.retrieved}
@@ -222,8 +194,8 @@ def test_retrieval_that_is_wrong_is_outweighed_by_what_the_frame_says(folder, tr
     assert iou(found.surface, truth[CAN]) > 0.85
 
 
-def test_a_retriever_may_be_named(folder, truth):
-    frame, prior = photograph({CAN: truth[CAN]}), open_prior(folder)
+def test_a_retriever_may_be_named(box_and_can, truth):
+    frame, prior = photograph({CAN: truth[CAN]}), open_prior(box_and_can)
     found = reconstruct(frame, prior, retriever="uniform")
     assert found.retriever == "uniform"
     shares = [each.probability for each in found.objects[0].retrieved]
@@ -246,7 +218,7 @@ class Sure:
         return self.shares
 
 
-def test_objects_share_the_time_of_retrieval_equally(folder, truth):
+def test_objects_share_the_time_of_retrieval_equally(box_and_can, truth):
     """The first answer is the work of all."""
 
     class Slow:
@@ -259,13 +231,13 @@ def test_objects_share_the_time_of_retrieval_equally(folder, truth):
             self.answered = True
             return np.array([0.5, 0.5])
 
-    found = reconstruct(photograph(truth), open_prior(folder), retriever=Slow(), workers=2)
+    found = reconstruct(photograph(truth), open_prior(box_and_can), retriever=Slow(), workers=2)
     shares = [item.seconds["retrieval"] for item in found.objects]
     assert shares[0] == shares[1] and sum(shares) >= 0.4
 
 
-def test_what_is_improbable_beside_an_explanation_is_not_placed(folder, truth):
-    prior = open_prior(folder)
+def test_what_is_improbable_beside_an_explanation_is_not_placed(box_and_can, truth):
+    prior = open_prior(box_and_can)
     sure = Sure([0.9 if name == "can" else 0.04 for name in prior.names])
     found = reconstruct(photograph({CAN: truth[CAN]}), prior, retriever=sure).objects[0]
     can, other = found.retrieved
@@ -274,9 +246,9 @@ def test_what_is_improbable_beside_an_explanation_is_not_placed(folder, truth):
     assert can.weight + found.unknown_weight == pytest.approx(1)
 
 
-def test_what_is_not_tried_counts_as_not_in_the_prior(folder, truth):
+def test_what_is_not_tried_counts_as_not_in_the_prior(box_and_can, truth):
     """However much of P(c|R) is with objects beyond the first k, the others gain nothing by it."""
-    prior = open_prior(folder)
+    prior = open_prior(box_and_can)
     weights = []
     for rest in (0.05, 0.0):
         sure = Sure([0.1 if name == "can" else rest for name in prior.names])
@@ -287,78 +259,24 @@ def test_what_is_not_tried_counts_as_not_in_the_prior(folder, truth):
     assert 0 < weights[0] == pytest.approx(weights[1])
 
 
-def test_a_map_that_is_nowhere_sure_enough_has_no_surface_but_files(folder, truth, tmp_path):
+def test_a_map_that_is_nowhere_sure_enough_has_no_surface_but_files(box_and_can, truth, tmp_path):
     config = replace(CONFIG, surface=replace(CONFIG.surface, level=0.99999))
-    result = reconstruct(photograph({CAN: truth[CAN]}), open_prior(folder), config=config)
+    result = reconstruct(photograph({CAN: truth[CAN]}), open_prior(box_and_can), config=config)
     assert result.objects[0].status == NO_SURFACE
     names = {path.name for path in write_results(result, tmp_path / "out")}
     assert names == {"frame.npz", "posterior.h5", "result.json", "preview.png"}
     assert list(open_posterior(tmp_path / "out" / "posterior.h5")) == [CAN]
 
 
-def test_without_a_table_in_sight_there_is_a_result_too(folder, truth):
+def test_without_a_table_in_sight_there_is_a_result_too(box_and_can, truth):
     frame = photograph({CAN: truth[CAN]}, table=False)
-    found = reconstruct(frame, open_prior(folder))
+    found = reconstruct(frame, open_prior(box_and_can))
     assert found.plane is None
     assert iou(found.objects[0].surface, truth[CAN]) > 0.7
 
 
-def test_the_number_of_threads_changes_no_byte(folder, truth, result):
-    again = reconstruct(photograph(truth), open_prior(folder), workers=1)
+def test_the_number_of_threads_changes_no_byte(box_and_can, truth, result):
+    again = reconstruct(photograph(truth), open_prior(box_and_can), workers=1)
     for one, other in zip(result.objects, again.objects, strict=True):
         assert one.surface.vertices.tobytes() == other.surface.vertices.tobytes()
         assert one.surface.uncertainty.tobytes() == other.surface.uncertainty.tobytes()
-
-
-def seen_from(mesh, turned):
-    """A frame of a mesh, in the first camera's frame, from a camera that has gone round the table;
-    the same as a table that has turned."""
-    around = similarity(rotation=turn_about_z(turned))
-    T = T_CAM_WORLD @ around @ T_WORLD_CAM
-    frame = photograph({STRANGE: in_camera(mesh, T)})
-    return replace(frame, T_world_cam=np.linalg.inv(around) @ T_WORLD_CAM), T
-
-
-@pytest.mark.slow
-def test_the_first_frame_of_a_stream_is_as_a_frame_alone(result, folder, truth):
-    again = Reconstructor(folder, track=True)(photograph(truth))
-    for a, b in zip(result.objects, again.objects, strict=True):
-        assert a.surface.vertices.tobytes() == b.surface.vertices.tobytes()
-        assert a.surface.uncertainty.tobytes() == b.surface.uncertainty.tobytes()
-        assert b.memory is None
-
-
-@pytest.mark.slow
-def test_the_view_of_the_other_side_halves_the_error_of_what_was_not_seen(folder):
-    """Of a bar that the prior does not hold: the second view knows what the first one saw."""
-    strange = in_camera(solids.box(0.20, 0.05, 0.05), placed(0.0, 0.0, 1.3))
-    frames = [seen_from(strange, turned) for turned in (0.0, np.pi)]
-    session = Reconstructor(folder, track=True)
-    session(frames[0][0])
-    both = session(frames[1][0]).objects[0]
-    alone = Reconstructor(folder)(frames[1][0]).objects[0]
-    # What the second camera alone does not see.
-    mesh = in_camera(strange, frames[1][1])
-    points, faces = trimesh.sample.sample_surface(mesh, 4000, seed=0)
-    hidden = points[np.einsum("ij,ij->i", mesh.face_normals[faces], points) > 0]
-    errors = [
-        MeshSurface(item.surface.as_trimesh()).nearest(hidden).distance.mean()
-        for item in (alone, both)
-    ]
-    assert errors[1] < errors[0] / 2
-    assert both.mean_uncertainty < alone.mean_uncertainty
-
-
-@pytest.mark.slow
-def test_a_stored_object_starts_from_where_it_was_and_is_found_again_where_it_was_pushed(folder):
-    session, other = (Reconstructor(folder, track=True, workers=n) for n in (1, 2))
-    for number, (turned, x) in enumerate([(0.0, 0.09), (0.4, 0.09), (0.6, 0.03)]):
-        mesh = in_camera(can(), placed(x, -0.04, 0.0))
-        frame, T = seen_from(mesh, turned)
-        item, again = session(frame).objects[0], other(frame).objects[0]
-        assert item.surface.vertices.tobytes() == again.surface.vertices.tobytes()
-        assert item.surface.uncertainty.tobytes() == again.surface.uncertainty.tobytes()
-        assert item.recognised.name == "can"
-        assert iou(item.surface, in_camera(mesh, T)) > 0.95
-        memory = session._seen[item.object_id]
-        assert len(memory) == (1, 2, 1)[number], "what was pushed is forgotten where it was"

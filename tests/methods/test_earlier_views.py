@@ -18,9 +18,9 @@ from brrp_cli.observation.support_plane import Plane
 from brrp_cli.registration.likelihood import see
 from brrp_cli.registration.model import search_model
 from brrp_cli.registration.pose_covariance import pose_covariance
-from brrp_cli.registration.pose_search import Hypothesis
 from brrp_cli.registration.ray_refinement import OtherRays, refine_by_rays
-from brrp_cli.registration.weigh import SeenFrom, joint_log_likelihood, weigh
+from brrp_cli.registration.views import SeenFrom, Views
+from brrp_cli.registration.weigh import joint_log_likelihood, weigh
 
 ID = 5
 DEFAULT = preset("default").hypotheses
@@ -98,7 +98,8 @@ def ratio(views, votes, scale=1.0):
     model = search_model(stored("box"))
     T = truth("box") @ np.linalg.inv(model.T_model_object)
     T[:3, :3] *= scale
-    return joint_log_likelihood(Hypothesis(model, T, 1.0, 0.9), views, votes, DEFAULT)
+    every = Views(tuple(views), np.zeros((0, 3)), votes)
+    return joint_log_likelihood(T, model, every, DEFAULT)
 
 
 def test_ratios_of_views_add_up_and_a_weak_recognition_gets_sure_or_is_dropped(seen):

@@ -6,50 +6,27 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from printed_model import painted, printed, turn
 from scipy.spatial.transform import Rotation
-from table_scene import MESHES, TABLE, in_camera, photograph, placed, stored
+from table_scene import (
+    T_CAM_WORLD,
+    T_WORLD_CAM,
+    one_view,
+    seen_from,
+)
 
 from brrp_cli.config import SearchConfig, SensorConfig
-from brrp_cli.geometry import similarity, transform_points
+from brrp_cli.geometry import transform_points
 from brrp_cli.registration.by_print import print_nats, turned_by_print
-from brrp_cli.registration.model import search_model
 from brrp_cli.registration.pose_covariance import pose_covariance
 from brrp_cli.registration.pose_search import Hypothesis
-from brrp_cli.registration.verification import Verifier
+from brrp_cli.registration.views import Views
 
 CONFIG, PATCH, WAVE = SearchConfig(), 0.01, 0.0005
 OPEN = SensorConfig(pose_turn=CONFIG.by_print.turn, pose_shift=CONFIG.by_print.shift)
 
 
-def printed(points, size):
-    """Colours (n, 3) of points (n, 3) on an object: bands and spots that no turn maps to
-    themselves."""
-    x, y, z = points.T / size
-    bands = np.stack([np.sin(4 * x + z), np.sin(5 * y + 1 + x), np.cos(4 * z + 2 * x * y)], axis=-1)
-    return (128 + 100 * bands).astype(np.uint8)
-
-
-def painted(name, light=1.0, noise=0.0):
-    """The model with print on it, where it stands, and a frame that shows it in other light, with
-    noise, of 255."""
-    model = search_model(stored(name))
-    shape, unit = model.stored.shape, model.stored.half_extent
-    colours = printed(shape.vertices * unit, unit)
-    record = {**model.stored.record, "coloured": True}
-    own = replace(model.stored, shape=replace(shape, colours=colours), record=record)
-    model = replace(model, stored=own)
-    T_cam_mesh = placed(0.0, 0.0, 0.4)
-    truth = T_cam_mesh @ similarity(translation=own.center)
-    frame = photograph({1: in_camera(MESHES[name](), T_cam_mesh)})
-    local = transform_points(np.linalg.inv(truth), np.nan_to_num(frame.points.reshape(-1, 3)))
-    rgb = (printed(local, unit) * light).reshape(frame.rgb.shape)
-    rgb = np.clip(rgb + np.random.default_rng(1).normal(0, noise, rgb.shape), 0, 255)
-    frame = replace(frame, rgb=np.where(frame.segmap[..., None] == 1, rgb, 90).astype(np.uint8))
-    points = np.random.default_rng(0).permutation(frame.object_points(1)).astype(np.float64)
-    return model, truth, Verifier(points, frame, TABLE)
-
-
-def found(model, T, verifier, config=CONFIG, judge=lambda T: 0.0):
+def found(model, T, verifier, config=CONFIG, judge=lambda T: 0.0, views=None):
     """What a placement becomes; depth is brought no nearer."""
 
     def covariance(T_cam_model):
@@ -57,17 +34,13 @@ def found(model, T, verifier, config=CONFIG, judge=lambda T: 0.0):
 
     return turned_by_print(
         Hypothesis(model, T, 1.0, 0.9),
-        verifier,
+        views or one_view(verifier),
         PATCH,
         config,
         judge,
         lambda each: each,
         covariance,
     ).T_cam_model
-
-
-def turn(*rotvec):
-    return similarity(rotation=Rotation.from_rotvec(rotvec).as_matrix())
 
 
 def degrees(T, truth):
@@ -119,11 +92,33 @@ def test_what_lies_further_from_the_points_is_not_taken_for_a_better_print():
     assert degrees(found(model, truth, verifier), truth) < 20
 
 
+AROUND = T_CAM_WORLD @ turn(0, 0, 2.0) @ T_WORLD_CAM  # like a camera that goes round
+
+
+def grey(frame):
+    return replace(frame, rgb=np.full_like(frame.rgb, 120))
+
+
+@pytest.mark.parametrize("votes", [1.0, 2.0])
+def test_what_an_earlier_view_showed_of_the_print_turns_it(votes):
+    """The present one has no colours to tell by; from the other side they were seen."""
+    model, truth, verifier = painted("ball")
+    _, _, earlier = painted("ball", around=AROUND)
+    plain = replace(verifier, frame=grey(verifier.frame))
+    here, there = seen_from(plain.frame, np.eye(4)), seen_from(earlier.frame, AROUND)
+    back = transform_points(np.linalg.inv(AROUND), earlier.points)
+    points = np.random.default_rng(0).permutation(np.concatenate([plain.points, back]))
+    off = truth @ turn(0.1, 0, 0.1)
+    assert np.array_equal(found(model, off, plain), off)
+    T = found(model, off, plain, views=Views((here, there), points, votes))
+    assert degrees(T, truth) < 2 < 5 < degrees(off, truth)
+
+
 def test_without_print_nothing_moves():
     model, truth, verifier = painted("ball")
     off = truth @ turn(0, 0, 0.1)
-    grey = np.full_like(model.stored.shape.colours, 120)
-    plain = replace(model.stored, shape=replace(model.stored.shape, colours=grey))
+    one = np.full_like(model.stored.shape.colours, 120)
+    plain = replace(model.stored, shape=replace(model.stored.shape, colours=one))
     assert np.array_equal(found(replace(model, stored=plain), off, verifier), off)
     bare = replace(model.stored, record={**model.stored.record, "coloured": False})
     assert np.array_equal(found(replace(model, stored=bare), off, verifier), off)

@@ -27,7 +27,9 @@ from brrp_cli.prior.build.make_object import make_object
 from brrp_cli.prior.objects import PriorObject
 from brrp_cli.prior.parameters import AppearanceConfig, BuildParameters
 from brrp_cli.raycast import look
+from brrp_cli.registration.likelihood import see
 from brrp_cli.registration.verification import Verifier
+from brrp_cli.registration.views import SeenFrom, Views
 from brrp_cli.shapes import solids
 
 K = np.array([[300.0, 0, 160], [0, 300.0, 120], [0, 0, 1]])
@@ -77,7 +79,14 @@ def fruit() -> trimesh.Trimesh:
     return solids.moved(mesh, z=-mesh.bounds[0, 2])
 
 
-MESHES = {"box": box, "ell": ell, "ball": ball, "beaker": beaker, "fruit": fruit}
+def mug() -> trimesh.Trimesh:
+    """A can with a handle on its +x side."""
+    return solids.union(
+        solids.cylinder(0.04, 0.1), solids.moved(solids.box(0.04, 0.015, 0.06), x=0.05, z=0.035)
+    )
+
+
+MESHES = {"box": box, "ell": ell, "ball": ball, "beaker": beaker, "fruit": fruit, "mug": mug}
 
 
 @cache
@@ -138,6 +147,19 @@ def photograph(
         K=K,
         T_world_cam=T_world_cam,
     )
+
+
+def seen_from(frame: Frame, T_view_cam: np.ndarray, object_id: int = 1) -> SeenFrom:
+    """What a frame shows of one object on `TABLE`; T_view_cam as of `SeenFrom`."""
+    config = preset("default").hypotheses
+    sensor, noise = config.sensor, pixel_noise(frame, TABLE, config.sensor)
+    pixels = see(frame, object_id, TABLE, noise, sensor.patch, sensor.bleed, config.likelihood)
+    return SeenFrom(pixels, T_view_cam)
+
+
+def one_view(verifier: Verifier) -> Views:
+    """Of object 1, in a frame that stands alone."""
+    return Views((seen_from(verifier.frame, np.eye(4)),), verifier.points, 1.0)
 
 
 def verifier_of(mesh: trimesh.Trimesh, T_cam_mesh: np.ndarray) -> Verifier:
