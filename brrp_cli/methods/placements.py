@@ -138,6 +138,7 @@ class Placer:
 
     @cached_property
     def _every_view(self) -> Views:
+        """The present view, and the earlier ones."""
         views, points = self._views, self._verifier.points
         seen = SeenFrom(self.seen, np.eye(4)), *views.seen()
         if views:

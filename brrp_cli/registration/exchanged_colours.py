@@ -24,8 +24,9 @@ VERTICES, LEAST = 2000, 40  # of an object that are asked, and that have to be s
 NEAR = 0.01  # metres between a vertex and the measured depth
 ALIGNED = 0.6  # alignment score from which on an object may be the one that lies there
 COLOURED = 0.05  # deviation of `_red_against_blue` under which there is nothing to compare
-# Correlation times the root of the number of objects. In 60 real and made frames it was -0.36 or
-# more, and -0.5 or less in most of those of stored objects once their channels were exchanged.
+# Correlation times the root of the number of objects. Where there were colours to compare, it was
+# -0.36 or more in some 60 real and made frames, and -0.5 or less in most of those that show stored
+# objects once their channels were exchanged. It decides on a warning, not on any result.
 EXCHANGED = -0.45
 _DARK = 30.0  # of 3 * 255, added to a sum of channels, so that black has no hue
 

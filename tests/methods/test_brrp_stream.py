@@ -17,7 +17,7 @@ from brrp_cli.shapes import solids
 BOX, CAN, STRANGE = 9, 4, 6
 
 
-def seen_from(mesh, turned):
+def gone_round(mesh, turned):
     """A frame of a mesh, in the first camera's frame, from a camera that has gone round the table;
     the same as a table that has turned."""
     around = similarity(rotation=turn_about_z(turned))
@@ -44,7 +44,7 @@ def test_the_first_frame_of_a_stream_is_as_a_frame_alone(box_and_can):
 def test_the_view_of_the_other_side_halves_the_error_of_what_was_not_seen(box_and_can):
     """Of a bar that the prior does not hold: the second view knows what the first one saw."""
     strange = in_camera(solids.box(0.20, 0.05, 0.05), placed(0.0, 0.0, 1.3))
-    frames = [seen_from(strange, turned) for turned in (0.0, np.pi)]
+    frames = [gone_round(strange, turned) for turned in (0.0, np.pi)]
     session = Reconstructor(box_and_can, track=True)
     session(frames[0][0])
     both = session(frames[1][0]).objects[0]
@@ -67,7 +67,7 @@ def test_a_stored_object_starts_from_where_it_was_and_is_found_again_where_it_wa
     session, other = (Reconstructor(box_and_can, track=True, workers=n) for n in (1, 2))
     for number, (turned, x) in enumerate([(0.0, 0.09), (0.4, 0.09), (0.6, 0.03)]):
         mesh = in_camera(can(), placed(x, -0.04, 0.0))
-        frame, T = seen_from(mesh, turned)
+        frame, T = gone_round(mesh, turned)
         item, again = session(frame).objects[0], other(frame).objects[0]
         assert item.surface.vertices.tobytes() == again.surface.vertices.tobytes()
         assert item.surface.uncertainty.tobytes() == again.surface.uncertainty.tobytes()
@@ -82,7 +82,7 @@ def test_poses_that_no_view_tells_apart_are_told_in_later_frames_too(box_and_can
     can_at = placed(0.09, -0.04, 0.0)
     session = Reconstructor(box_and_can, track=True)
     for turned in (0.0, 1.2):
-        frame, T = seen_from(in_camera(can(), can_at), turned)
+        frame, T = gone_round(in_camera(can(), can_at), turned)
         item = session(frame).objects[0]
     assert len(session._tracker._seen[item.object_id]) == 2
     best = item.recognised
