@@ -174,9 +174,24 @@ def interpolated(depth: Depth) -> Depth:
 
 
 def filled(depth: Depth) -> Depth:
-    """With what is on the left of a hole in it, as some cameras' filters fill them."""
+    """With what is on the left of a hole in it, as some cameras' filters fill them. What lies on
+    the image's left border stays."""
     column = np.where(depth > 0, np.arange(depth.shape[1]), 0)
     return np.take_along_axis(depth, np.maximum.accumulate(column, axis=1), axis=1)
+
+
+def filled_from(choice: Callable[[list[float]], float]) -> Change:
+    """With the farthest or the nearest depth above a hole's pixel and on the left of it, as
+    librealsense's filter fills them: row by row, with what was filled before."""
+
+    def change(depth: Depth) -> Depth:
+        whole = depth.copy()
+        for v, u in np.argwhere(depth[1:-1, 1:] == 0) + 1:
+            left, above = whole[v - 1 : v + 2, u - 1], whole[v - 1 : v + 2 : 2, u]
+            whole[v, u] = choice([float(z) for z in (*left, *above) if z > 0] or [0.0])
+        return whole
+
+    return change
 
 
 def without_edges(depth: Depth) -> Depth:
@@ -222,6 +237,8 @@ CONDITIONS = {
     "no_edges": with_depth(without_edges),
     "interpolated": with_depth(interpolated),
     "filled": with_depth(filled),
+    "filled_far": with_depth(filled_from(max)),
+    "filled_near": with_depth(filled_from(min)),
     "moved": with_colour(lambda rgb: np.roll(rgb, (2, 4), (0, 1))),
     "grey": with_colour(grey),
     "dark": with_colour(lambda rgb: (255 * (rgb / 255) ** 1.6).astype(np.uint8)),
