@@ -4,7 +4,7 @@ in the frame tell, since what is reddest of their print is then bluest in the im
 from __future__ import annotations
 
 import logging
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,9 +23,10 @@ Array = NDArray[np.float64]
 VERTICES, LEAST = 2000, 40  # of an object that are asked, and that have to be seen
 NEAR = 0.01  # metres between a vertex and the measured depth
 ALIGNED = 0.6  # alignment score from which on an object may be the one that lies there
+SURE = 0.9  # weight from which on it is that one
 COLOURED = 0.05  # deviation of `_red_against_blue` under which there is nothing to compare
 # Correlation times the root of the number of objects. Where there were colours to compare, it was
-# -0.36 or more in some 60 real and made frames, and -0.5 or less in most of those that show stored
+# -0.44 or more in some 100 real and made frames, and -0.5 or less in most of those that show stored
 # objects once their channels were exchanged. It decides on a warning, not on any result.
 EXCHANGED = -0.45
 _DARK = 30.0  # of 3 * 255, added to a sum of channels, so that black has no hue
@@ -57,19 +58,31 @@ def colours_exchanged(found: Iterable[tuple[Retrieved, PriorObject]], frame: Fra
     stored one that lies best there, and that object."""
     if frame.hueless:
         return False
-    pairs = [
-        pair
-        for placed, stored in found
-        if stored.record.get("coloured") and (pair := _seen_print(placed, stored, frame)).size
-    ]
-    if not pairs:
+    pairs, sure = [], []
+    for placed, stored in found:
+        if not stored.record.get("coloured"):
+            continue
+        pair = _seen_print(placed, stored, frame)
+        if pair.size:
+            pairs.append(pair)
+            if (placed.weight or 0.0) >= SURE:
+                sure.append(pair)
+    # What is recognised lies there; what fits best may be something else, of any colour.
+    if _correlation(sure) > 0:
         return False
+    return bool(_correlation(pairs) * np.sqrt(len(pairs)) <= EXCHANGED)
+
+
+def _correlation(pairs: Sequence[Array]) -> float:
+    """Of red against blue as stored and in the image, (2, n) each; 0 where there is nothing to
+    compare."""
+    if not pairs:
+        return 0.0
     stored, image = np.concatenate(pairs, axis=1)
     squares = (stored**2).sum(), (image**2).sum()
     if min(squares) < COLOURED**2 * len(stored):
-        return False
-    correlation = float((stored * image).sum() / np.sqrt(squares[0] * squares[1]))
-    return correlation * np.sqrt(len(pairs)) <= EXCHANGED
+        return 0.0
+    return float((stored * image).sum() / np.sqrt(squares[0] * squares[1]))
 
 
 def best_aligned(retrieved: Iterable[Retrieved]) -> Retrieved | None:

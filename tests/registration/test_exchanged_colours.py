@@ -51,6 +51,19 @@ def test_what_has_no_colours_says_nothing():
         assert not colours_exchanged(pairs, swapped(image))
 
 
+def test_what_is_recognised_says_more_than_what_only_fits():
+    (placed_there, stored), frame = lying("box")
+    swapped_print = replace(
+        stored, shape=replace(stored.shape, colours=stored.shape.colours[:, ::-1])
+    )
+    lookalikes = [(replace(placed_there, weight=0.01), swapped_print)] * 3
+    for weight, told in ((0.5, True), (0.95, False)):
+        found = [(replace(placed_there, weight=weight), stored), *lookalikes]
+        assert colours_exchanged(found, frame) is told
+    recognised = replace(placed_there, weight=0.95), stored
+    assert colours_exchanged([recognised], swapped(frame))
+
+
 def test_another_object_of_this_shape_says_nothing():
     """What is printed on it has nothing to do with what is stored."""
     (placed_there, stored), frame = lying("ball")
