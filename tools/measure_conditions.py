@@ -181,7 +181,7 @@ def filled(depth: Depth) -> Depth:
 
 
 def filled_from(choice: Callable[[list[float]], float]) -> Change:
-    """With the farthest or the nearest depth above a hole's pixel and on the left of it, as
+    """With the farthest or the nearest depth on the left of a hole's pixel, above and below it, as
     librealsense's filter fills them: row by row, with what was filled before."""
 
     def change(depth: Depth) -> Depth:

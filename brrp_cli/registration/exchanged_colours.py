@@ -26,8 +26,9 @@ ALIGNED = 0.6  # alignment score from which on an object may be the one that lie
 SURE = 0.9  # weight from which on it is that one
 COLOURED = 0.05  # deviation of `_red_against_blue` under which there is nothing to compare
 # Correlation times the root of the number of objects. Where there were colours to compare, it was
-# -0.44 or more in some 100 real and made frames, and -0.5 or less in most of those that show stored
-# objects once their channels were exchanged. It decides on a warning, not on any result.
+# -0.44 or more in some 100 real and made frames, but for one where what is `SURE` spoke against it,
+# and -0.5 or less in most of those that show stored objects once their channels were exchanged. It
+# decides on a warning, not on any result.
 EXCHANGED = -0.45
 _DARK = 30.0  # of 3 * 255, added to a sum of channels, so that black has no hue
 
