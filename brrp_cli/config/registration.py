@@ -257,4 +257,4 @@ class WeighConfig:
     most_unknown: float = share(0.97)
     least_share: float = share(1e-3)
     small: int = between(600, 1, 1_000_000)
-    doubt: float = between(2.0, 0.0, 100.0)
+    doubt: float = between(4.0, 0.0, 100.0)

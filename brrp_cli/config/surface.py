@@ -63,7 +63,7 @@ class SurfaceConfig:
     steps: int = 17
     most_apart: float = 0.05
     guessed: float = share(0.2)
-    fidelity: float = 0.00035
+    fidelity: float = 0.00038
     pose_share: float = share(0.9)
     band_draws: int = 4_000
     band_vertices: int = 300

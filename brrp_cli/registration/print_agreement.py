@@ -2,7 +2,8 @@
 
 A box is the same from its front and its back, a can whichever way it is turned: depth cannot tell,
 and colour can. Light makes one side of it darker than the other, and may have fallen from elsewhere
-when the object was scanned: how bright a side is as a whole tells nothing of how it is turned.
+when the object was scanned: neither how bright it is nor how brightness changes with the way a
+surface faces tells how it is turned, or which of two fruits it is.
 """
 
 from __future__ import annotations
@@ -26,6 +27,17 @@ Mask = NDArray[np.bool_]
 # Brightness, red against green, both against blue: unit vectors at right angles.
 _OPPONENT = np.array([[1.0, 1.0, 1.0], [1.0, -1.0, 0.0], [0.5, 0.5, -1.0]])
 _OPPONENT /= np.linalg.norm(_OPPONENT, axis=1, keepdims=True)
+# Light multiplies all channels: of their logarithms it changes brightness alone. Of 255; what is
+# darker than _DARK is noise for the most part. In the middle, at _MIDDLE, a step stays as it is.
+_DARK, _MIDDLE = 16.0, 128.0
+
+
+def _perceived(values: Array) -> Array:
+    """Logarithms of values of 255, steps of _MIDDLE as they were."""
+    return (_DARK + _MIDDLE) * np.log((_DARK + values) / (_DARK + _MIDDLE))
+
+
+_CURVE = _perceived(np.arange(256.0))
 
 
 @dataclass(frozen=True)
@@ -71,11 +83,13 @@ def agreement(
 ) -> Agreement:
     """Of placements T_cam_model (B, 4, 4), of one size, in cells of `cell` metres, of at most
     `vertices` vertices. Colours are means over cells, since letters lie a little elsewhere; each
-    channel about its own mean, and brightness about that of each side of the model's box, so that
-    how light falls on it does not count. Of an image without hue, brightness alone.
+    channel about its own mean, and brightness about what is linear in the normals, as diffuse light
+    from one side is, so that how light falls on it does not count. Of an image without hue,
+    brightness alone.
 
     lost : as in `print_agreement`"""
-    sample = _sampled(model.stored.shape, model.stored.half_extent, vertices, cell)
+    hueless = frame.hueless
+    sample = _sampled(model.stored.shape, model.stored.half_extent, vertices, cell, hueless)
     correlation, stored, image, cells = agreements(
         np.ascontiguousarray(T_cam_model),
         sample.points,
@@ -83,15 +97,15 @@ def agreement(
         sample.offsets,
         sample.colours,
         sample.cell,
-        sample.side,
         frame.rgb,
         frame.depth,
         np.zeros(frame.shape, np.bool_) if lost is None else lost,
         frame.K,
         _OPPONENT,
+        _CURVE,
         config.near,
         config.least_seen,
-        1 if frame.hueless else 3,
+        1 if hueless else 3,
     ).T
     printed = np.minimum(stored, image) >= config.unprinted
     return Agreement(np.where(printed, correlation, 0.0), np.where(printed, stored, 0.0), cells)
@@ -101,9 +115,8 @@ def agreement(
 class _Sample:
     """Vertices of a stored mesh, metres, model's axes, whose colours are compared.
 
-    points, normals : (n, 3); offsets : (n,) of the planes through them; colours : (n, 3), along
-    `_OPPONENT`; cell : (n,) number of the cell of the surface; side : (n,) of the box, 0 to 5,
-    which they face
+    points, normals : (n, 3); offsets : (n,) of the planes through them; colours : (n, 3), on the
+    scale of `_CURVE`, along `_OPPONENT`; cell : (n,) number of the cell of the surface
     """
 
     points: Array
@@ -111,17 +124,18 @@ class _Sample:
     offsets: Array
     colours: Array
     cell: NDArray[np.int64]
-    side: NDArray[np.int64]
 
 
 @lru_cache(maxsize=128)
-def _sampled(shape: StoredShape, unit: float, vertices: int, cell: float) -> _Sample:
-    """Of `vertices` vertices; unit : metres of one unit of the shape's coordinates."""
+def _sampled(shape: StoredShape, unit: float, vertices: int, cell: float, hueless: bool) -> _Sample:
+    """Of `vertices` vertices; unit : metres of one unit of the shape's coordinates; hueless : as a
+    camera sees them that tells no hues apart."""
     rows = np.linspace(0, len(shape.vertices) - 1, vertices).astype(np.int64)
     points = shape.vertices[rows].astype(np.float64) * unit
     normals = shape.normals[rows].astype(np.float64)
     offsets = (points * normals).sum(axis=1)
-    axis = np.abs(normals).argmax(axis=1)
-    side = 2 * axis + (np.take_along_axis(normals, axis[:, None], axis=1)[:, 0] > 0)
-    colours = shape.colours[rows].astype(np.float64) @ _OPPONENT.T
-    return _Sample(points, normals, offsets, colours, cells_of(points, cell), side)
+    colours = shape.colours[rows].astype(np.float64)
+    if hueless:
+        colours[:] = colours.mean(axis=1, keepdims=True)
+    colours = _perceived(colours) @ _OPPONENT.T
+    return _Sample(points, normals, offsets, colours, cells_of(points, cell))

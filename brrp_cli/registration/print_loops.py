@@ -14,8 +14,27 @@ Array = NDArray[np.float64]
 # Columns of what is found: the correlation, the standard deviations of the stored colours and of
 # the image's, and how many cells of the surface the camera sees.
 CORRELATION, STORED, IMAGE, CELLS = 0, 1, 2, 3
-# Of a box.
-_SIDES = 6
+# Added for each point to the squares of the normals: where all of them are one, light is no more
+# than a mean.
+_FLAT = 0.003
+
+
+@compiled
+def _lit(normals: Array, bright: Array) -> Array:
+    """(4, 2) how brightness (n, 2) depends on the normals (n, 3): by how much it grows with each
+    component, and what it is without, by least squares."""
+    squares, products, row = np.zeros((4, 4)), np.zeros((4, 2)), np.ones(4)
+    for n in range(len(normals)):
+        row[:3] = normals[n]
+        for i in range(4):
+            for j in range(4):
+                squares[i, j] += row[i] * row[j]
+            for j in range(2):
+                products[i, j] += row[i] * bright[n, j]
+    for i in range(3):
+        squares[i, i] += _FLAT * len(normals)
+    products[:] = np.linalg.solve(squares, products)
+    return products
 
 
 @compiled
@@ -26,24 +45,24 @@ def agreements(
     offsets: Array,
     colours: Array,
     cell: NDArray[np.int64],
-    side: NDArray[np.int64],
     rgb: NDArray[np.uint8],
     depth: NDArray[np.floating],
     lost: NDArray[np.bool_],
     K: Array,
     opponent: Array,
+    curve: Array,
     near: float,
     least: int,
     channels: int,
 ) -> Array:
     """(B, 4) of placements (B, 4, 4): see the columns above; 0 where fewer than `least` points are
-    seen. Colours are means over cells, each channel about its own mean, and brightness about that
-    of each side, of what is seen.
+    seen. Colours are means over cells, each channel about its own mean, and brightness about what
+    light from one side would make of it, of what is seen.
 
     points, normals : (n, 3) metres, model's axes; offsets : (n,) of the planes through them, seen
-    from where the camera is beyond; colours : (n, 3) stored, along `opponent` (3, 3), whose first
-    row is brightness; cell, side : (n,) numbers, from 0 on, of the cell of the surface and of the
-    side of the box
+    from where the camera is beyond; colours : (n, 3) stored, on the scale that `curve` (256,) leads
+    to, along `opponent` (3, 3), whose first row is brightness; cell : (n,) numbers, from 0 on, of
+    the cells of the surface
     rgb, depth, lost : (H, W, 3), (H, W) metres, (H, W): a point is seen where the measured depth is
     within `near` metres of it, or where that is lost
     channels : of the colours that are compared, the first ones
@@ -51,6 +70,7 @@ def agreements(
     height, width = depth.shape
     found = np.zeros((len(T_cam_model), 4))
     seen, pixel = np.empty(len(points), np.int64), np.empty((len(points), 3))
+    toward, bright = np.empty((len(points), 3)), np.empty((len(points), 2))
     count = np.zeros(cell.max() + 1)
     sums = np.zeros((2, len(count), 3))
     eye = np.empty(3)
@@ -60,7 +80,6 @@ def agreements(
         for i in range(3):
             eye[i] = -(T[0, i] * T[0, 3] + T[1, i] * T[1, 3] + T[2, i] * T[2, 3]) / square
         total = 0
-        on_side, bright = np.zeros(_SIDES), np.zeros((2, _SIDES))
         for n in range(len(points)):
             p, a = points[n], normals[n]
             if a[0] * eye[0] + a[1] * eye[1] + a[2] * eye[2] <= offsets[n]:
@@ -79,17 +98,14 @@ def agreements(
             for i in range(3):
                 pixel[total, i] = 0.0
                 for j in range(3):
-                    pixel[total, i] += opponent[i, j] * rgb[row, column, j]
+                    pixel[total, i] += opponent[i, j] * curve[rgb[row, column, j]]
+            bright[total, 0], bright[total, 1] = colours[n, 0], pixel[total, 0]
+            toward[total] = a
             seen[total] = n
-            on_side[side[n]] += 1
-            bright[0, side[n]] += colours[n, 0]
-            bright[1, side[n]] += pixel[total, 0]
             total += 1
         if total < least:
             continue
-        for s in range(_SIDES):
-            for k in range(2):
-                bright[k, s] /= max(on_side[s], 1.0)
+        lit = _lit(toward[:total], bright[:total])
         count[:] = 0
         sums[:] = 0
         mean = np.zeros((2, 3))
@@ -99,8 +115,9 @@ def agreements(
             for i in range(channels):
                 one, other = colours[n, i], pixel[t, i]
                 if i == 0:
-                    one -= bright[0, side[n]]
-                    other -= bright[1, side[n]]
+                    a = toward[t]
+                    one -= a[0] * lit[0, 0] + a[1] * lit[1, 0] + a[2] * lit[2, 0] + lit[3, 0]
+                    other -= a[0] * lit[0, 1] + a[1] * lit[1, 1] + a[2] * lit[2, 1] + lit[3, 1]
                 sums[0, cell[n], i] += one
                 sums[1, cell[n], i] += other
                 mean[0, i] += one / total

@@ -82,9 +82,9 @@ def test_faint_print_says_little_and_strong_print_all(scene) -> None:
     assert print_agreement(T, model, frame, CONFIG) > 0.8
 
     def fainter(share):
-        shape = replace(
-            model.stored.shape, colours=(model.stored.shape.colours * share).astype(np.uint8)
-        )
+        """The same print, faded to grey."""
+        faded = 115 + share * (model.stored.shape.colours.astype(float) - 115)
+        shape = replace(model.stored.shape, colours=faded.round().astype(np.uint8))
         return replace(model, stored=replace(model.stored, shape=shape))
 
     assert 0 < print_agreement(T, fainter(0.1), frame, CONFIG) < 0.3
@@ -156,3 +156,28 @@ def test_print_tells_how_a_box_is_turned_in_whatever_light(scene) -> None:
     right, wrong = (print_agreement(each, model, frame, CONFIG) for each in (T, back_to_front))
     assert right > 0.6 and wrong < -0.6
     assert right > raw_correlation(T, model, frame)
+
+
+def test_dim_light_leaves_print_as_it_is(scene) -> None:
+    model, T, frame = scene
+    bright = print_agreement(T, model, frame, CONFIG)
+    dim = replace(frame, rgb=(0.4 * frame.rgb).astype(np.uint8))
+    assert print_agreement(T, model, dim, CONFIG) == pytest.approx(bright, abs=0.02)
+
+
+def test_light_on_a_plain_ball_is_no_print() -> None:
+    """Scanned in light from one side, and seen in light from the same: all that agrees is light."""
+    model = search_model(stored("ball"))
+    T_cam_mesh = placed(0.0, 0.0, 0.4)
+    T = T_cam_mesh @ similarity(translation=model.stored.center)
+    frame = photograph({1: in_camera(MESHES["ball"](), T_cam_mesh)})
+    yellow, shape = np.array([220.0, 190.0, 60.0]), model.stored.shape
+    scanned = yellow * (0.7 + 0.3 * shape.normals[:, :1])
+    lit = replace(shape, colours=scanned.astype(np.uint8))
+    model = replace(model, stored=replace(model.stored, shape=lit))
+    local = transform_points(np.linalg.inv(T), np.nan_to_num(frame.points.reshape(-1, 3)))
+    normals = local / np.linalg.norm(local, axis=1, keepdims=True)
+    seen = (yellow * (0.6 + 0.4 * normals[:, :1])).clip(0, 255).astype(np.uint8)
+    frame = replace(frame, rgb=seen.reshape(frame.rgb.shape))
+    assert raw_correlation(T, model, frame) > 0.9
+    assert abs(print_agreement(T, model, frame, CONFIG)) < 0.1
