@@ -31,7 +31,8 @@ class ColourConfig:
     if that gains `gain`: a box that one buys is not quite the one that was scanned. It counts in
     full from a standard deviation of `printed` (of 255) on, and not at all under `unprinted`.
     Colours are means over cells of `cell` metres, of at most `vertices` vertices, of which
-    `least_seen` have to be within `near` metres of the measured depth. asked : whether any of this
+    `least_seen` have to be within `near` metres of the measured depth. Their logarithms are
+    compared, of 255; what is under `dark` is noise for the most part. asked : whether any of this
     is done
     """
 
@@ -43,6 +44,7 @@ class ColourConfig:
     gain: float = 0.05
     printed: float = 20.0
     unprinted: float = 5.0
+    dark: float = 16.0
     cell: float = 0.012
     vertices: int = 4000
     least_seen: int = 40

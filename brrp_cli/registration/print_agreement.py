@@ -27,17 +27,20 @@ Mask = NDArray[np.bool_]
 # Brightness, red against green, both against blue: unit vectors at right angles.
 _OPPONENT = np.array([[1.0, 1.0, 1.0], [1.0, -1.0, 0.0], [0.5, 0.5, -1.0]])
 _OPPONENT /= np.linalg.norm(_OPPONENT, axis=1, keepdims=True)
-# Light multiplies all channels: of their logarithms it changes brightness alone. Of 255; what is
-# darker than _DARK is noise for the most part. In the middle, at _MIDDLE, a step stays as it is.
-_DARK, _MIDDLE = 16.0, 128.0
+# Of 255: where a step has the size on the scale of logarithms that it has on that of the image.
+_MIDDLE = 128.0
 
 
-def _perceived(values: Array) -> Array:
-    """Logarithms of values of 255, steps of _MIDDLE as they were."""
-    return (_DARK + _MIDDLE) * np.log((_DARK + values) / (_DARK + _MIDDLE))
+def _logarithms(values: Array, dark: float) -> Array:
+    """Of values of 255, above `dark` for the most part. Light multiplies all channels: of their
+    logarithms it changes brightness alone."""
+    return (dark + _MIDDLE) * np.log((dark + values) / (dark + _MIDDLE))
 
 
-_CURVE = _perceived(np.arange(256.0))
+@lru_cache
+def _curve(dark: float) -> Array:
+    """(256,) the same of what an image may hold."""
+    return _logarithms(np.arange(256.0), dark)
 
 
 @dataclass(frozen=True)
@@ -88,8 +91,9 @@ def agreement(
     brightness alone.
 
     lost : as in `print_agreement`"""
-    hueless = frame.hueless
-    sample = _sampled(model.stored.shape, model.stored.half_extent, vertices, cell, hueless)
+    dark, hueless = config.dark, frame.hueless
+    shape, unit = model.stored.shape, model.stored.half_extent
+    sample = _sampled(shape, unit, vertices, cell, dark, hueless)
     correlation, stored, image, cells = agreements(
         np.ascontiguousarray(T_cam_model),
         sample.points,
@@ -102,7 +106,7 @@ def agreement(
         np.zeros(frame.shape, np.bool_) if lost is None else lost,
         frame.K,
         _OPPONENT,
-        _CURVE,
+        _curve(dark),
         config.near,
         config.least_seen,
         1 if hueless else 3,
@@ -115,8 +119,8 @@ def agreement(
 class _Sample:
     """Vertices of a stored mesh, metres, model's axes, whose colours are compared.
 
-    points, normals : (n, 3); offsets : (n,) of the planes through them; colours : (n, 3), on the
-    scale of `_CURVE`, along `_OPPONENT`; cell : (n,) number of the cell of the surface
+    points, normals : (n, 3); offsets : (n,) of the planes through them; colours : (n, 3), their
+    logarithms, along `_OPPONENT`; cell : (n,) number of the cell of the surface
     """
 
     points: Array
@@ -127,9 +131,11 @@ class _Sample:
 
 
 @lru_cache(maxsize=128)
-def _sampled(shape: StoredShape, unit: float, vertices: int, cell: float, hueless: bool) -> _Sample:
-    """Of `vertices` vertices; unit : metres of one unit of the shape's coordinates; hueless : as a
-    camera sees them that tells no hues apart."""
+def _sampled(
+    shape: StoredShape, unit: float, vertices: int, cell: float, dark: float, hueless: bool
+) -> _Sample:
+    """Of `vertices` vertices; unit : metres of one unit of the shape's coordinates; dark : as in
+    `_logarithms`; hueless : as a camera sees them that tells no hues apart."""
     rows = np.linspace(0, len(shape.vertices) - 1, vertices).astype(np.int64)
     points = shape.vertices[rows].astype(np.float64) * unit
     normals = shape.normals[rows].astype(np.float64)
@@ -137,5 +143,5 @@ def _sampled(shape: StoredShape, unit: float, vertices: int, cell: float, hueles
     colours = shape.colours[rows].astype(np.float64)
     if hueless:
         colours[:] = colours.mean(axis=1, keepdims=True)
-    colours = _perceived(colours) @ _OPPONENT.T
-    return _Sample(points, normals, offsets, colours, cells_of(points, cell))
+    along = _logarithms(colours, dark) @ _OPPONENT.T
+    return _Sample(points, normals, offsets, along, cells_of(points, cell))

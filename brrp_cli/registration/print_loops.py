@@ -60,12 +60,13 @@ def agreements(
     light from one side would make of it, of what is seen.
 
     points, normals : (n, 3) metres, model's axes; offsets : (n,) of the planes through them, seen
-    from where the camera is beyond; colours : (n, 3) stored, on the scale that `curve` (256,) leads
-    to, along `opponent` (3, 3), whose first row is brightness; cell : (n,) numbers, from 0 on, of
-    the cells of the surface
+    from where the camera is beyond; colours : (n, 3) stored, on the scale of `curve`, along
+    `opponent` (3, 3), whose first row is brightness; cell : (n,) numbers, from 0 on, of the cells
+    of the surface
     rgb, depth, lost : (H, W, 3), (H, W) metres, (H, W): a point is seen where the measured depth is
     within `near` metres of it, or where that is lost
-    channels : of the colours that are compared, the first ones
+    curve : (256,) what values of the image become; channels : of the colours that are compared, the
+    first ones
     """
     height, width = depth.shape
     found = np.zeros((len(T_cam_model), 4))
